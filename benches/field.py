@@ -12,8 +12,8 @@ import numpy as np
 import truearm as ta
 from benches.ours import measured_with_threads
 from benches.timing import Comparison, Results, Series, seconds_of, seconds_once
+from truearm.rows.splitting import SplitRule, split_rows
 from truearm.simulation import VirtualArm
-from truearm.splitting import SplitRule, split_rows
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "ur10_ipa_C.csv"
 TRAINING = 400

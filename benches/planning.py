@@ -11,7 +11,7 @@ from benches.numpy_exchange import Exchange
 from benches.ours import measured_with_threads
 from benches.timing import Comparison, Results, seconds_of
 from truearm import _core
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 from truearm.simulation import PAPER_PARAMETERS
 
 CANDIDATES, CHOSEN, PASSES = 5000, 60, 20

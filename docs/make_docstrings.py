@@ -17,7 +17,7 @@ are in rad and lengths in m where no unit is in a name. Shapes are in parenthese
 """
 MODULES = {
     "truearm": (),
-    "truearm.scheme_options": ("SchemeOptions",),
+    "truearm.fits.scheme_options": ("SchemeOptions",),
     "truearm.simulation": ("VirtualArm", "Imperfections"),
     "truearm.inverse": ("Inverse",),
     "truearm.planning": (),

@@ -10,9 +10,9 @@ from pydantic import BaseModel
 
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS
+from truearm.description.robot_file import RobotFile
 from truearm.fleet.fleet_file import ArmSection, DefaultsSection, FleetFile
 from truearm.programs.frames import FramesFile
-from truearm.robot_file import RobotFile
 
 FOLDER = Path(__file__).parent / "reference" / "schemas"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from truearm.calibration_file import Arrays, calibration_bytes, parse_calibration
+from truearm.storage.calibration_file import Arrays, calibration_bytes, parse_calibration
 
 
 def read_calibration_file(path: Path) -> tuple[Arrays, dict[str, Any]]:

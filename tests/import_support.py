@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from truearm.importing import ImportPlan
-from truearm.raw_tables import Marks
+from truearm.tables.raw_tables import Marks
 
 PLAIN = "J1,J2,px,py,pz\n90,45,1000,2000,3000\n-90,0,1500,2500,3500\n"
 COLUMNS = {"q1": "J1", "q2": "J2", "x": "px", "y": "py", "z": "pz"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.splitting import split_rows
+from truearm.rows.splitting import split_rows
 
 UR10, IRB120, UR5 = "ur10", "abb-irb-120", "ur5"
 

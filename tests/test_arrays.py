@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from truearm.arrays import as_transforms, rotation_fault
-from truearm.rotation_columns import RotationColumns
 from truearm.simulation import VirtualArm
+from truearm.tables.rotation_columns import RotationColumns
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
 

@@ -5,8 +5,8 @@ import pytest
 
 import truearm as ta
 from tests.remastered import remastered_table
-from truearm.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
 from truearm.cli import main
+from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
 from truearm.frame_share import FRAME_UNCERTAIN
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm

@@ -15,9 +15,9 @@ from safetensors.numpy import save as save_arrays
 
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
-from truearm import calibration_file
-from truearm.calibration_file import DIGEST, NO_DIGEST
 from truearm.simulation import VirtualArm
+from truearm.storage import calibration_file
+from truearm.storage.calibration_file import DIGEST, NO_DIGEST
 
 
 @pytest.fixture(scope="module")

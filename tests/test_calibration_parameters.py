@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from truearm._core import MeasurementSet, Problem, Setup, identifiability
-from truearm.identifiability import identify
-from truearm.identified import IdentifiedArm
-from truearm.library import library_names
-from truearm.parameters import candidates
+from truearm.description.library import library_names
+from truearm.fits.identifiability import identify
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.parameters import candidates
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 

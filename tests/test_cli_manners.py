@@ -20,8 +20,8 @@ from truearm.cli.display import DISPLAY, Counted, Expected, in_words
 from truearm.cli.durations import Took, place, remember, remembered
 from truearm.cli.lazy import LazyCommand
 from truearm.cli.progress import told_progress, told_stages
+from truearm.description.library import library_names
 from truearm.errors import Notice
-from truearm.library import library_names
 from truearm.programs.languages import language_of
 from truearm.simulation import VirtualArm
 

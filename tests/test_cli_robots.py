@@ -12,8 +12,8 @@ import pytest
 from truearm.cli import COMMANDS, console, main
 from truearm.cli.entry import Entry
 from truearm.cli.lazy import build
+from truearm.description.library import library_names
 from truearm.errors import InputError, Notice, UsageError, WorkError
-from truearm.library import library_names
 from truearm.robot import Robot
 
 HEAVY = ("numpy", "pandas", "scipy", "truearm._core", "truearm.robot")

@@ -8,9 +8,9 @@ import pytest
 
 import truearm as ta
 from tests.test_doubts import notice_of
-from truearm.conventions import Convention, conventions_of
-from truearm.nominal_misfit import NominalArm, Seen
-from truearm.parameters import ALPHA, A, D
+from truearm.doubts.conventions import Convention, conventions_of
+from truearm.doubts.nominal_misfit import NominalArm, Seen
+from truearm.fits.parameters import ALPHA, A, D
 from truearm.simulation import VirtualArm
 
 

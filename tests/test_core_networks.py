@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import truearm as ta
 from truearm import _core
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 
 Floats = NDArray[np.float64]
 LOW, HIGH = np.deg2rad([[-150.0, -30.0, -120.0], [150.0, 100.0, 0.0]])

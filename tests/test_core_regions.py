@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import truearm as ta
 from truearm import _core
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 from truearm.simulation import PAPER_PARAMETERS
 
 Floats = NDArray[np.float64]

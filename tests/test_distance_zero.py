@@ -7,7 +7,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli.calibrate import suggest_next
-from truearm.doubts import helps
+from truearm.doubts.of_results import helps
 from truearm.simulation import VirtualArm
 
 ANCHOR = np.array([0.9, -0.6, 0.2])

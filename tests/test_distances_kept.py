@@ -8,10 +8,10 @@ import pytest
 
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
-from truearm.calibration_file import NO_DIGEST
 from truearm.cli import main
-from truearm.points_together import points_together
+from truearm.doubts.points_together import points_together
 from truearm.simulation import VirtualArm
+from truearm.storage.calibration_file import NO_DIGEST
 
 IRB = ta.Robot.load("abb-irb-120")
 PAIRS = 100

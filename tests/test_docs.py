@@ -20,24 +20,26 @@ from pathlib import Path
 import pytest
 
 import truearm as ta
-from truearm import doubts, validation
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
 from truearm.cell.session_schema import SCHEMA
 from truearm.cli import COMMANDS
+from truearm.description.robot_file import RobotFile
+from truearm.doubts import of_results as doubts
 from truearm.fleet import Fleet
+from truearm.judgement import validation
 from truearm.programs.frames import FramesFile
 from truearm.reporting import advice, gravity, other_data
 from truearm.reporting import known as certainty
 from truearm.robot import Robot
-from truearm.robot_file import RobotFile
 from truearm.simulation import VirtualArm
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
     ROOT / "examples" / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
 ]

@@ -12,9 +12,9 @@ import pytest
 import truearm as ta
 from tests.report_support import words_of
 from truearm.cli import main
-from truearm.doubts import no_help, poses_aside
-from truearm.grids import grid_steps, grid_words
-from truearm.identified import IdentifiedArm
+from truearm.doubts.grids import grid_steps, grid_words
+from truearm.doubts.of_results import no_help, poses_aside
+from truearm.fits.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm

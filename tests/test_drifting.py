@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 import truearm as ta
 from tests.report_support import words_of
 from truearm import drifting
-from truearm.calibration_content import pack, unpack
 from truearm.cli import main
 from truearm.drifting import Drift
-from truearm.fitting import fit_rows
+from truearm.fits.fitting import fit_rows
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
+from truearm.storage.calibration_content import pack, unpack
 
 FAR = np.array([0.12, -0.05, 0.16]) / 1e3
 ROWS = 150

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.core_set import select
-from truearm.enough_values import measured_values
-from truearm.fitting import Task
-from truearm.identified import IdentifiedArm
+from truearm.fits.core_set import select
+from truearm.fits.enough_values import measured_values
+from truearm.fits.fitting import Task
+from truearm.fits.identified import IdentifiedArm
 from truearm.simulation import VirtualArm
 
 UR10 = ta.Robot.load("ur10")

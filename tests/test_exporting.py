@@ -20,11 +20,11 @@ import truearm as ta
 from truearm import Robot
 from truearm.cli import main
 from truearm.controller import Controller
+from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting import FORMATS, Options, constant_robot, export
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.exporting.urdf_file import comment
-from truearm.library import library_names
 from truearm.simulation import VirtualArm
 from truearm.ur_kinematics import has_ur_structure, robot_from_yaml
 

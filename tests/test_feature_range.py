@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.calibration_file import NO_DIGEST, calibration_bytes, parse_calibration
 from truearm.cli import main
 from truearm.exporting import Options, export
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 from truearm.solving import beyond_learnt
+from truearm.storage.calibration_file import NO_DIGEST, calibration_bytes, parse_calibration
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 FAR = "payload_kg = 500 lies beyond 0 to 8, where it was learnt: corrections are guesses there."

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import truearm as ta
-from truearm.few_values import few_values, values_words
-from truearm.grids import grid_steps
+from truearm.doubts.few_values import few_values, values_words
+from truearm.doubts.grids import grid_steps
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 

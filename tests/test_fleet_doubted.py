@@ -6,10 +6,10 @@ import pytest
 
 import truearm as ta
 from truearm.calibrating import OPEN_SETUP
+from truearm.doubts.held_tool import never_turns_freely
 from truearm.errors import Notice
 from truearm.fleet import Fleet, run_fleet
 from truearm.fleet.doubted import grave_notices
-from truearm.held_tool import never_turns_freely
 from truearm.simulation import VirtualArm
 
 POSES = 60

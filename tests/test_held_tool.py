@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import truearm as ta
-from truearm.held_tool import held_tool, held_words
+from truearm.doubts.held_tool import held_tool, held_words
 from truearm.reporting.report import report
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm

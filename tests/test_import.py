@@ -15,8 +15,8 @@ from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
 from truearm.measurements import Measurements
-from truearm.raw_tables import Marks, read_raw
-from truearm.rotation_columns import RotationColumns
+from truearm.tables.raw_tables import Marks, read_raw
+from truearm.tables.rotation_columns import RotationColumns
 from truearm.units import unit_in_header
 
 IPA_OPTIONS = [

@@ -12,8 +12,8 @@ from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
-from truearm.raw_tables import Marks
 from truearm.simulation import VirtualArm
+from truearm.tables.raw_tables import Marks
 
 
 def test_the_command_names_columns_of_both_tables(tmp_path: Path) -> None:

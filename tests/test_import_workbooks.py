@@ -16,8 +16,8 @@ from tests.import_support import PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import import_table
-from truearm.raw_tables import Marks, read_raw
-from truearm.workbooks import sheet_text
+from truearm.tables.raw_tables import Marks, read_raw
+from truearm.tables.workbooks import sheet_text
 
 ROWS = [[each if k == 0 else float(each) for each in line.split(",")] for k, line in enumerate(PLAIN.split())]
 

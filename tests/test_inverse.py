@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from truearm import Robot
+from truearm.description.library import library_names
 from truearm.errors import InputError, WorkError
 from truearm.inverse import Inverse
-from truearm.library import library_names
 
 SPHERICAL = {
     "abb-irb-120",

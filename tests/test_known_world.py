@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.doubts import ANOTHER_FRAME, NO_HELP
+from truearm.doubts.of_results import ANOTHER_FRAME, NO_HELP
 from truearm.lengths import length_mm
 from truearm.simulation import Imperfections, VirtualArm
 

@@ -7,9 +7,9 @@ import pytest
 
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
-from truearm.calibration_file import NO_DIGEST
 from truearm.evaluation import EvaluationOptions
 from truearm.simulation import Imperfections, VirtualArm
+from truearm.storage.calibration_file import NO_DIGEST
 
 UR10 = ta.Robot.load("ur10")
 QUATERNION = ["qw", "qx", "qy", "qz"]

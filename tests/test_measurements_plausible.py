@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from truearm.description.library import library_names
+from truearm.doubts.plausibility import FAR_FACTOR, check_against
 from truearm.errors import InputError
-from truearm.library import library_names
 from truearm.measurements import Measurements
-from truearm.plausibility import FAR_FACTOR, check_against
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
 from truearm.units import LengthUnit

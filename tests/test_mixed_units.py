@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.doubts.mixed_units import check_mixed_units
+from truearm.doubts.plausibility import check_against
 from truearm.errors import InputError
-from truearm.mixed_units import check_mixed_units
-from truearm.plausibility import check_against
 from truearm.simulation import VirtualArm
 
 ROBOT = ta.Robot.load("ur10")

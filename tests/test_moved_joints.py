@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.doubts.whitened import Whitened
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.whitened import Whitened
 
 ROWS = 60
 WARM = 15.0 * (1.0 - np.exp(-3.0 * np.linspace(0.0, 1.0, ROWS)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truearm.cell.plan import PlanOptions, plan_poses
-from truearm.one_turn import one_turn
+from truearm.description.one_turn import one_turn
 from truearm.robot import Robot
 
 PI = np.pi

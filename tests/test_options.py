@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm import core_set, intervals
+from truearm import intervals
 from truearm.cell.plan import PlanOptions
+from truearm.fits import core_set
+from truearm.fits.scheme_options import SchemeOptions
 from truearm.programs.densify import Spacing
-from truearm.scheme_options import SchemeOptions
 from truearm.simulation import VirtualArm
 
 api: Any = ta

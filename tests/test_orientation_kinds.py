@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from truearm.cli.calibrate import print_determined, suggest_next
-from truearm.euler_orders import VECTOR, otherwise_read, twin
+from truearm.doubts.turning_sense import check_turns
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
 from truearm.rotations import quaternion_from_euler
 from truearm.simulation import VirtualArm
-from truearm.turning_sense import check_turns
+from truearm.tables.euler_orders import VECTOR, otherwise_read, twin
 
 QUATERNION = ["qw", "qx", "qy", "qz"]
 

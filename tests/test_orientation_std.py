@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import truearm as ta
-from truearm.endpoints import at_target
+from truearm.fits.endpoints import at_target
 from truearm.simulation import VirtualArm
 
 

@@ -15,8 +15,8 @@ from truearm.cell.poses_file import Poses
 from truearm.cell.reaching import within_reach
 from truearm.cell.rehearsal import rehearse
 from truearm.cli import main
+from truearm.description.library import library_names
 from truearm.errors import UsageError
-from truearm.library import library_names
 from truearm.planning import AboveFloor, ClearOfItself, InBox, accessible
 from truearm.planning.accessibility import Places, lowest
 from truearm.planning.joint_ways import JointWays, stepped

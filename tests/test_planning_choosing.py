@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from truearm._core import independent_columns
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 from truearm.planning import (
     ChoiceOptions,
     DividedSpace,

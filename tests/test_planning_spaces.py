@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.library import library_names
 from truearm.planning.accessibility import (
     STEPS_ALONG_LINK,
     AboveFloor,

@@ -7,7 +7,7 @@ import pytest
 
 import truearm as ta
 from tests.nests import a_target_a_row
-from truearm.points_together import KIND, points_together
+from truearm.doubts.points_together import KIND, points_together
 from truearm.simulation import VirtualArm
 
 POSES = 40

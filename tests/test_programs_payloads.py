@@ -3,8 +3,8 @@
 from tests.programs_rig import ABB
 from tests.test_programs_rapid import GO, points
 from tests.test_programs_rewriting import TWO, but, program_of
+from truearm.description.robot_data import Payload
 from truearm.programs.notices import payload_notices
-from truearm.robot_data import Payload
 
 
 def several_loads():

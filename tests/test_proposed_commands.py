@@ -16,7 +16,7 @@ from truearm.cli import calibrate, main, session_export
 from truearm.cli.again import calibrate_again, calibrate_anew, plan_anew
 from truearm.cli.command_words import option_words
 from truearm.errors import typed
-from truearm.options import Options
+from truearm.fits.options import Options
 from truearm.simulation import VirtualArm
 
 

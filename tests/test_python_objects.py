@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm import identified, planning, streaming
+from truearm import planning, streaming
 from truearm.compensation import TOOLS_KEPT
 from truearm.exporting import export
+from truearm.fits import identified
 from truearm.framing import find_object, find_tool
 from truearm.inverse import Inverse
 from truearm.proposing import Candidates, next_poses
@@ -246,7 +247,7 @@ WRONG = {
     ),
     "poses chosen for a robot": (
         lambda r, d, c: plans.choose(r, d.readings, 9),
-        "Make it of a robot: truearm.iden",
+        "Make it of a robot: truearm.fits.identified",
     ),
     "an arm by name": (lambda r, d, c: arms.IdentifiedArm("ur10"), "Robot.load"),
     "a space by name": (lambda r, d, c: plans.JointSpace("ur10"), "Robot.load"),

@@ -18,9 +18,10 @@ from tests.report_support import (
     small_calibration,
     words_of,
 )
-from truearm.doubts import CONSTANT_BETTER
+from truearm.certainty.standard_errors import of_covariance
+from truearm.doubts.of_results import CONSTANT_BETTER
 from truearm.errors import Notice
-from truearm.options import Options
+from truearm.fits.options import Options
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
 from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
@@ -29,7 +30,6 @@ from truearm.reporting.script import licence_notice
 from truearm.reporting.waves import strongest_wave
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.simulation.imperfections import Deflection, Mass
-from truearm.standard_errors import of_covariance
 
 STATISTICS = ("mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm")
 MODELS = ("variable", "constant", "regions", "fcmac", "cmac")

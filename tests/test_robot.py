@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from truearm.description.library import library_names
+from truearm.description.robot_data import Payload
+from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
-from truearm.library import library_names
 from truearm.robot import Robot
-from truearm.robot_data import Payload
-from truearm.urdf_names import UrdfNames
 
 LINK = """
 [[link]]

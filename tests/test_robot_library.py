@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from truearm.library import library_names
+from truearm.description.library import library_names
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]

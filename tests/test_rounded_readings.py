@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.rounded_readings import rounded_notices
+from truearm.doubts.rounded_readings import rounded_notices
 from truearm.simulation import VirtualArm
 
 UR10 = ta.Robot.load("ur10")

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 import truearm as ta
 from truearm.cell.plan import PlanOptions, plan_poses
-from truearm.details import DriftDetails, Jump
+from truearm.doubts.row_order import poses_change
 from truearm.drifting import drift_notices
+from truearm.fits.details import DriftDetails, Jump
 from truearm.reporting.report import report
-from truearm.row_order import poses_change
 from truearm.simulation import VirtualArm
 
 ROWS = 90

@@ -6,8 +6,8 @@ import pytest
 
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file
-from truearm.same_tables import called_as_files
 from truearm.simulation import VirtualArm
+from truearm.tables.same_tables import called_as_files
 
 ROWS = 40
 

@@ -13,7 +13,7 @@ from truearm import Calibration, Options, Robot, UsageError, WorkError, calibrat
 from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
-from truearm.scheme_options import SchemeOptions
+from truearm.fits.scheme_options import SchemeOptions
 from truearm.simulation import Imperfections, VirtualArm
 
 QUICK: dict[str, Any] = {"most_regions": 12, "region_rows": 12, "holdout": 0.3, "cells": (9, 7, 7)}

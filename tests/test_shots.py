@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.scheme_options import SchemeOptions
-from truearm.shots import Scatter, variance_factor
+from truearm.fits.scheme_options import SchemeOptions
+from truearm.rows.shots import Scatter, variance_factor
+from truearm.rows.visits import one_row_a_pose
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.visits import one_row_a_pose
 
 SHOTS = 4
 

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from truearm.core_set import distance_count
 from truearm.errors import InputError, UsageError
+from truearm.fits.core_set import distance_count
+from truearm.fits.options import Options
 from truearm.measurements import Measurements
-from truearm.options import Options
-from truearm.splitting import HoldoutRange, SplitRule, split_rows
+from truearm.rows.splitting import HoldoutRange, SplitRule, split_rows
 
 
 def table(count, *, seed=0, **columns):

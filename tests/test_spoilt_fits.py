@@ -7,12 +7,12 @@ import pytest
 
 import truearm as ta
 from truearm import calibrating
-from truearm.doubts import SURE, Outliers, constant_is_better
-from truearm.fitting import fit_rows
-from truearm.held_rows import HeldRows
-from truearm.models import CONSTANT, NOMINAL, VARIABLE
+from truearm.doubts.of_results import SURE, Outliers, constant_is_better
+from truearm.fits.fitting import fit_rows
+from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE
+from truearm.judgement.held_rows import HeldRows
+from truearm.judgement.validation import FEW_HELD, RowErrors
 from truearm.simulation import VirtualArm
-from truearm.validation import FEW_HELD, RowErrors
 
 FRESH = 99
 

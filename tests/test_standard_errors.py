@@ -8,10 +8,10 @@ import pytest
 
 import truearm as ta
 from tests.remastered import remastered
-from truearm import calibration_content
-from truearm.models import CONSTANT
+from truearm.certainty.standard_errors import of_covariance
+from truearm.fits.models import CONSTANT
 from truearm.simulation import Deflection, Harmonic, Imperfections, JointError, Mass, VirtualArm
-from truearm.standard_errors import of_covariance
+from truearm.storage import calibration_content
 
 POSES = 150
 GIVES_WAY = Deflection(

@@ -9,11 +9,11 @@ import pytest
 import truearm as ta
 from truearm.cell.proposed import ProposalOptions, kept_still, propose_acceptance
 from truearm.cli import main
+from truearm.fits.stillness import moved_joints, still_joints, still_words
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
 from truearm.rotations import matrix_from_quaternion
 from truearm.simulation import VirtualArm
-from truearm.stillness import moved_joints, still_joints, still_words
 
 KINDS = ("revolute", "prismatic", "revolute")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.uneven_setups import UNEVEN_SETUPS
 
 TRACKER, CAMERA = 40, 30
 

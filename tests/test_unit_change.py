@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.doubts.unit_change import check_one_unit
 from truearm.errors import InputError
 from truearm.simulation import VirtualArm
-from truearm.unit_change import check_one_unit
 
 ROWS = 60
 

@@ -4,11 +4,11 @@ import pytest
 
 import truearm as ta
 from tests.remastered import remastered_table
-from truearm import calibration_content
-from truearm.calibration_file import calibration_bytes
+from truearm.certainty.uncertainty import noises_of
 from truearm.proposing import Candidates, acceptance_poses
 from truearm.simulation import VirtualArm
-from truearm.uncertainty import noises_of
+from truearm.storage import calibration_content
+from truearm.storage.calibration_file import calibration_bytes
 from truearm.updating.scale import known_scale
 
 

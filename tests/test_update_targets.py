@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.known_scale import common_share
+from truearm.fits.known_scale import common_share
 from truearm.simulation import VirtualArm
 
 TARGETS_MM = ((30.0, 20.0, 50.0), (-60.0, 10.0, 80.0), (20.0, -70.0, 20.0))

@@ -18,8 +18,8 @@ from tests.remastered import (
 )
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
-from truearm.core_set import Selection
 from truearm.errors import Notice
+from truearm.fits.core_set import Selection
 from truearm.programs.notices import update_notices
 from truearm.reporting.facts import Facts
 from truearm.reporting.report import report
@@ -394,8 +394,8 @@ def test_kept_parts_need_a_set_up_that_is_known(known):
 
 
 def test_set_up_derivatives_are_those_of_finite_differences(known):
-    from truearm.core_set import core_set, select
-    from truearm.fitting import Task
+    from truearm.fits.core_set import core_set, select
+    from truearm.fits.fitting import Task
     from truearm.updating import UpdateOptions
     from truearm.updating.scene import Scene
     from truearm.updating.unknowns import Unknowns

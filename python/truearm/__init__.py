@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from truearm.controller import Controller
     from truearm.errors import InputError, Notice, TruearmError, UsageError, WorkError
     from truearm.evaluation import Evaluation, EvaluationOptions, evaluate
+    from truearm.fits.options import Options
     from truearm.limits import Limits
     from truearm.measurements import Measurements
-    from truearm.options import Options
     from truearm.programs.compensating import compensate_program
     from truearm.programs.frames import Frames
     from truearm.programs.rewriting import Choices, Rewritten
     from truearm.release import __version__ as __version__
     from truearm.robot import Robot
-    from truearm.splitting import HoldoutRange, SplitRule
+    from truearm.rows.splitting import HoldoutRange, SplitRule
     from truearm.updating import Update, UpdateOptions, roll_back, update
 
 __all__ = [
@@ -79,14 +79,14 @@ _HOME: Final = {
     "evaluate": "evaluation",
     "Limits": "limits",
     "Measurements": "measurements",
-    "Options": "options",
+    "Options": "fits.options",
     "compensate_program": "programs.compensating",
     "Frames": "programs.frames",
     "Choices": "programs.rewriting",
     "Rewritten": "programs.rewriting",
     "Robot": "robot",
-    "HoldoutRange": "splitting",
-    "SplitRule": "splitting",
+    "HoldoutRange": "rows.splitting",
+    "SplitRule": "rows.splitting",
     "Update": "updating",
     "UpdateOptions": "updating",
     "roll_back": "updating",

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm.calibration import Calibration
-from truearm.columns import VALIDATE
-from truearm.conventions import fits_otherwise
-from truearm.core_set import select
-from truearm.details import ConstantDetails, VariableDetails, left_m
-from truearm.distance_zero import zero_notices
-from truearm.doubts import (
+from truearm.certainty.standard_errors import counted_covariance, standard_errors
+from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
+from truearm.doubts.conventions import fits_otherwise
+from truearm.doubts.distance_zero import zero_notices
+from truearm.doubts.exchanged import exchanges
+from truearm.doubts.known_world import another_frame
+from truearm.doubts.moved_joints import moved_joints
+from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
     NO_HELP,
     SINGLE_ROWS,
@@ -29,13 +31,23 @@ from truearm.doubts import (
     stated_too_large,
     stood_still,
 )
+from truearm.doubts.plausibility import check_against
+from truearm.doubts.points_together import points_together
+from truearm.doubts.rounded_readings import rounded_notices
+from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.row_order import order_notices
+from truearm.doubts.turning_sense import check_turns
+from truearm.doubts.uneven_setups import uneven_setups
+from truearm.doubts.unexplained import unexplained
+from truearm.doubts.whitened import Whitened
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
-from truearm.endpoints import at_tool
-from truearm.enough_values import group_unknowns
 from truearm.errors import InputError, Notice, UsageError, count_of
-from truearm.exchanged import exchanges
-from truearm.fitted_rows import FittedRows, sides
-from truearm.fitting import (
+from truearm.fits.core_set import select
+from truearm.fits.details import ConstantDetails, VariableDetails, left_m
+from truearm.fits.endpoints import at_tool
+from truearm.fits.enough_values import group_unknowns
+from truearm.fits.fitted_rows import FittedRows, sides
+from truearm.fits.fitting import (
     ENOUGH_FOR_HYPER,
     NOTHING_KNOWN,
     Fits,
@@ -47,38 +59,26 @@ from truearm.fitting import (
     fit_rows,
     no_stages,
 )
-from truearm.held_rows import HeldRows
-from truearm.identifiability import Identifiability
-from truearm.identified import IdentifiedArm
+from truearm.fits.identifiability import Identifiability
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.known_scale import KnownScale, common_share
+from truearm.fits.measured_parts import MeasuredParts, sureness
+from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.fits.options import Options
+from truearm.fits.scheme_options import SchemeOptions
+from truearm.fits.schemes import NETWORKS, REGIONS
 from truearm.intervals import interval_coverage
-from truearm.judging import check_judged, judge, where_found
-from truearm.known_scale import KnownScale, common_share
-from truearm.known_world import another_frame
+from truearm.judgement.held_rows import HeldRows
+from truearm.judgement.judging import check_judged, judge, where_found
+from truearm.judgement.validation import Validation
 from truearm.lengths import length_mm
-from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
-from truearm.moved_joints import moved_joints
-from truearm.options import Options
-from truearm.plausibility import check_against
-from truearm.points_together import points_together
 from truearm.robot import Robot
-from truearm.rounded_readings import rounded_notices
-from truearm.row_lag import CHANGE, fits_shifted
-from truearm.row_order import order_notices
-from truearm.scheme_options import SchemeOptions
-from truearm.schemes import NETWORKS, REGIONS
-from truearm.splitting import Split, measured_on_both_sides, split_rows
-from truearm.standard_errors import counted_covariance, standard_errors
-from truearm.summary import distance_at_floor_mm, whole_noise_mm
-from truearm.turning_sense import check_turns
-from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
-from truearm.uneven_setups import uneven_setups
-from truearm.unexplained import unexplained
+from truearm.rows.splitting import Split, measured_on_both_sides, split_rows
+from truearm.rows.visits import pose_count, pose_counts
+from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
+from truearm.tables.columns import VALIDATE
 from truearm.units import MM_PER_METRE
-from truearm.validation import Validation
-from truearm.visits import pose_count, pose_counts
-from truearm.whitened import Whitened
 
 Floats = NDArray[np.float64]
 

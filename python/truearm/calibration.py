@@ -9,35 +9,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm import calibration_content
 from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
-from truearm.calibration_file import calibration_bytes, parse_calibration, read_calibration
-from truearm.conservative import conservative_of
-from truearm.core_set import Selection
-from truearm.details import ConstantDetails, VariableDetails
-from truearm.endpoints import Endpoint, at_target, at_tool
+from truearm.certainty.conservative import conservative_of
+from truearm.certainty.uncertainty import AXES as ROWS_TOGETHER
+from truearm.certainty.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
-from truearm.fitted_rows import FittedRows
-from truearm.held_rows import HeldRows
-from truearm.identifiability import Identifiability
-from truearm.identified import IdentifiedArm
+from truearm.fits.core_set import Selection
+from truearm.fits.details import ConstantDetails, VariableDetails
+from truearm.fits.endpoints import Endpoint, at_target, at_tool
+from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.identifiability import Identifiability
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.measured_parts import MeasuredParts
+from truearm.fits.models import CONSTANT, ArmModel
+from truearm.fits.options import Options
+from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.inputs import Features, feature_columns
+from truearm.judgement.held_rows import HeldRows
+from truearm.judgement.validation import Validation
 from truearm.kinds import words
 from truearm.lengths import length_mm
 from truearm.limits import Task
-from truearm.measured_parts import MeasuredParts
-from truearm.models import CONSTANT, ArmModel
-from truearm.options import Options
 from truearm.revision import Revision
 from truearm.robot import Robot
-from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
-from truearm.summary import summarise
-from truearm.uncertainty import AXES as ROWS_TOGETHER
-from truearm.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
-from truearm.validation import Validation
+from truearm.storage import calibration_content
+from truearm.storage.calibration_file import calibration_bytes, parse_calibration, read_calibration
+from truearm.storage.summary import summarise
 
 Floats = NDArray[np.float64]
 

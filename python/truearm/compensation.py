@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from truearm._core import CoreError, Corrector, Solver
 from truearm.arrays import as_numbers, as_rows, as_transforms
 from truearm.calibration import Calibration
-from truearm.endpoints import at_tool
 from truearm.errors import InputError, WorkError, count_of
+from truearm.fits.endpoints import at_tool
 from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.robot import Robot

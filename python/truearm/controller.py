@@ -8,9 +8,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.endpoints import at_tool
 from truearm.errors import InputError, list_names
 from truearm.files import read_text
+from truearm.fits.endpoints import at_tool
 from truearm.inverse import Inverse
 from truearm.robot import URDF_ENDINGS, Robot
 from truearm.ur_kinematics import robot_from_conf, robot_from_yaml

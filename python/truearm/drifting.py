@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
-from truearm.details import ANOTHER_PLACE, DriftDetails, Jump
+from truearm.doubts.row_order import places, poses_change
+from truearm.doubts.unexplained import unexplained
 from truearm.errors import Notice
-from truearm.fitted_rows import without_drift
-from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
+from truearm.fits.details import ANOTHER_PLACE, DriftDetails, Jump
+from truearm.fits.fitted_rows import without_drift
+from truearm.fits.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
+from truearm.fits.models import CONSTANT, VARIABLE
+from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, VARIABLE
-from truearm.row_order import places, poses_change
-from truearm.unexplained import unexplained
+from truearm.rows.visits import means, visit_numbers
 from truearm.units import MM_PER_METRE
-from truearm.validation import RowErrors
-from truearm.visits import means, visit_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -9,25 +9,30 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm._core import ANGLE_ARM_M, Setup, fit_constant
-from truearm.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.calibration import Calibration
-from truearm.core_set import Selection, Use, core_set, rotations, select, select_fitted
 from truearm.defaults import FIRST_TARGET, SEED
-from truearm.doubts import NO_HELP, no_help
+from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
+from truearm.doubts.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
+from truearm.doubts.of_results import NO_HELP, no_help
+from truearm.doubts.plausibility import check_against
+from truearm.doubts.points_together import points_together
+from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
-from truearm.fitted_rows import known_rows
-from truearm.fitting import (
+from truearm.fits.core_set import Selection, Use, core_set, rotations, select, select_fitted
+from truearm.fits.fitted_rows import known_rows
+from truearm.fits.fitting import (
     Stages,
     Task,
     core_errors,
     fit_options,
     no_stages,
 )
+from truearm.fits.measured_parts import held_parts
+from truearm.fits.models import NOMINAL, ArmModel
 from truearm.frame_rows import divide
 from truearm.frame_share import FoundSetUps
-from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
-from truearm.held_rows import HeldRows
-from truearm.judging import (
+from truearm.judgement.held_rows import HeldRows
+from truearm.judgement.judging import (
     check_judged,
     holding_nothing,
     judge,
@@ -36,19 +41,14 @@ from truearm.judging import (
     where_found,
     without_parts,
 )
+from truearm.judgement.validation import Errors, RowErrors, means_in_words
 from truearm.lengths import length_mm
-from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
-from truearm.models import NOMINAL, ArmModel
-from truearm.plausibility import check_against
-from truearm.points_together import points_together
 from truearm.registration import register
+from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
-from truearm.summary import distance_at_floor_mm
-from truearm.turning_sense import check_turns
+from truearm.storage.summary import distance_at_floor_mm
 from truearm.units import MM_PER_METRE
-from truearm.validation import Errors, RowErrors, means_in_words
-from truearm.visits import pose_count, pose_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

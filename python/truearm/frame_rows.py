@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.enough_values import frame_unknowns, group_unknowns, measured_values
 from truearm.errors import InputError, list_names, rows_in_words
-from truearm.fitting import Task
+from truearm.fits.enough_values import frame_unknowns, group_unknowns, measured_values
+from truearm.fits.fitting import Task
 from truearm.measurements import Measurements
-from truearm.visits import pose_numbers
+from truearm.rows.visits import pose_numbers
 
 if TYPE_CHECKING:
     from truearm.evaluation import EvaluationOptions

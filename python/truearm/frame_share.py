@@ -7,19 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import setup_jacobian
-from truearm.core_set import core_set, first_measured
-from truearm.enough_values import frame_unknowns
 from truearm.errors import Notice, rows_in_words
-from truearm.fitting import Task
-from truearm.judging import model_inputs
+from truearm.fits.core_set import core_set, first_measured
+from truearm.fits.enough_values import frame_unknowns
+from truearm.fits.fitting import Task
+from truearm.fits.measured_parts import held_parts
+from truearm.fits.models import ArmModel
+from truearm.judgement.judging import model_inputs
+from truearm.judgement.validation import RowErrors
 from truearm.lengths import length_mm
-from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
-from truearm.models import ArmModel
-from truearm.shots import Scatter
+from truearm.rows.shots import Scatter
+from truearm.rows.visits import pose_count, pose_numbers
 from truearm.units import MM_PER_METRE
-from truearm.validation import RowErrors
-from truearm.visits import pose_count, pose_numbers
 
 Floats = NDArray[np.float64]
 

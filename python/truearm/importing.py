@@ -9,7 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from truearm.columns import (
+from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
+from truearm.joined_tables import join_tables
+from truearm.measurements import Measurements
+from truearm.tables.columns import (
     DISTANCE,
     JOINT,
     QUATERNION,
@@ -19,13 +22,10 @@ from truearm.columns import (
     MissingColumnError,
     StatedUnits,
 )
-from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
-from truearm.joined_tables import join_tables
-from truearm.measured_fields import read_fields
-from truearm.measurements import Measurements
-from truearm.raw_tables import Marks, RawTable, read_raw
-from truearm.reading import table_from_frame
-from truearm.rotation_columns import RotationColumns
+from truearm.tables.measured_fields import read_fields
+from truearm.tables.raw_tables import Marks, RawTable, read_raw
+from truearm.tables.reading import table_from_frame
+from truearm.tables.rotation_columns import RotationColumns
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
 
 Floats = NDArray[np.float64]

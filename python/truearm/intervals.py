@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import NORMAL_95, residuals
-from truearm.core_set import core_set
-from truearm.fitting import Fits, Task
-from truearm.judging import model_inputs
+from truearm.doubts.nominal_misfit import some_rows
+from truearm.fits.core_set import core_set
+from truearm.fits.fitting import Fits, Task
+from truearm.fits.models import VARIABLE
+from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
-from truearm.models import VARIABLE
-from truearm.nominal_misfit import some_rows
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, list_names, list_rows
-from truearm.raw_tables import RawTable
+from truearm.tables.raw_tables import RawTable
 
 Integers = NDArray[np.int64]
 

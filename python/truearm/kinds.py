@@ -15,7 +15,7 @@ WAYS: Final[Mapping[str, str]] = {
     "Candidates": "Make them of poses: Candidates(calibration, readings)",
     "Compensator": "Make it of a calibration: Compensator(calibration)",
     "Controller": "Declare it: Controller.nominal(robot), Controller.load(path)",
-    "IdentifiedArm": "Make it of a robot: truearm.identified.IdentifiedArm(robot)",
+    "IdentifiedArm": "Make it of a robot: truearm.fits.identified.IdentifiedArm(robot)",
     "Measurements": "Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
     "Robot": 'Load it: Robot.load("ur10"), or from a TOML or URDF file',
 }

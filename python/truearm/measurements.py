@@ -12,13 +12,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, as_row_numbers
-from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import required
-from truearm.measured_fields import read_fields
-from truearm.reading import read_csv_table, table_from_frame
-from truearm.same_tables import identities, told_apart
+from truearm.tables.columns import StatedUnits
+from truearm.tables.measured_fields import read_fields
+from truearm.tables.reading import read_csv_table, table_from_frame
+from truearm.tables.same_tables import identities, told_apart
 
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]

@@ -8,17 +8,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm import robot_dict, robot_toml
 from truearm._core import Chain
 from truearm.arrays import as_rows, check_out
+from truearm.description import robot_dict, robot_toml
+from truearm.description.library import library_text
+from truearm.description.robot_checks import check_sizes
+from truearm.description.robot_data import Convention, Floats, Joint, RobotData
+from truearm.description.robot_file import parse_robot_file
+from truearm.description.robot_table import table_fields
+from truearm.description.urdf import UrdfChain, read_urdf, urdf_chain
 from truearm.errors import InputError
 from truearm.files import is_file, read_text
-from truearm.library import library_text
-from truearm.robot_checks import check_sizes
-from truearm.robot_data import Convention, Floats, Joint, RobotData
-from truearm.robot_file import parse_robot_file
-from truearm.robot_table import table_fields
-from truearm.urdf import UrdfChain, read_urdf, urdf_chain
 
 URDF_ENDINGS: Final = (".urdf", ".xml")
 TABLE_ENDINGS: Final = (".csv", ".tsv", ".txt", ".xlsx")

@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import ArmModel, CoreError, Solver
 from truearm.arrays import as_rows, as_transforms
-from truearm.endpoints import at_tool
+from truearm.certainty.learnt_features import learnt_spans
+from truearm.certainty.uncertainty import ConstantSpread
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_rows
+from truearm.fits.endpoints import at_tool
 from truearm.inputs import feature_columns
-from truearm.learnt_features import learnt_spans
 from truearm.limits import TASKS, Limits, Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
-from truearm.uncertainty import ConstantSpread
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration

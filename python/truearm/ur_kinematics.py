@@ -23,9 +23,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from truearm.dh_from_axes import Axis, dh_from_axes
+from truearm.description.dh_from_axes import Axis, dh_from_axes
+from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, list_names
-from truearm.joint_axes import axes_at_zero
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_euler, transform_from_parts
 

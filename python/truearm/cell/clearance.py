@@ -13,7 +13,7 @@ from truearm._core import Chain
 from truearm._core import Clearance as Gaps
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.panel import Panel
-from truearm.parameters import A, D
+from truearm.fits.parameters import A, D
 from truearm.robot import Robot
 from truearm.units import to_si
 

@@ -16,12 +16,11 @@ from truearm.cell.prediction import Prediction
 from truearm.cell.reaching import within_reach
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
-from truearm.columns import REPEAT, VALIDATE
 from truearm.defaults import THERE_AND_BACK
+from truearm.description.one_turn import one_turn
 from truearm.errors import UsageError, WorkError, count_of
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 from truearm.kinds import check_values, settle
-from truearm.one_turn import one_turn
 from truearm.planning.accessibility import Rule
 from truearm.planning.choosing import (
     CRITERIA,
@@ -34,6 +33,7 @@ from truearm.planning.choosing import (
 )
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
+from truearm.tables.columns import REPEAT, VALIDATE
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]

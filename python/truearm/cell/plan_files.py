@@ -9,9 +9,9 @@ import pandas as pd
 
 from truearm.cell.plan import Plan
 from truearm.cell.proposed import Proposed
-from truearm.columns import REPEAT
 from truearm.errors import UsageError
 from truearm.files import read_bytes, write_whole
+from truearm.tables.columns import REPEAT
 from truearm.units import MM_PER_METRE
 
 COLOURS: Final = {

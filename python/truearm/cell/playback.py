@@ -12,11 +12,11 @@ from truearm.cell.device_errors import DeviceError, RefusedError
 from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section
-from truearm.columns import APPROACH
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import transform_from_parts
+from truearm.tables.columns import APPROACH
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import APPROACH, PURPOSE, StatedUnits
 from truearm.errors import InputError, list_names, list_rows
-from truearm.measured_fields import read_joint_columns
-from truearm.reading import Table, read_csv_table
 from truearm.robot import Robot
+from truearm.tables.columns import APPROACH, PURPOSE, StatedUnits
+from truearm.tables.measured_fields import read_joint_columns
+from truearm.tables.reading import Table, read_csv_table
 
 Floats = NDArray[np.float64]
 

@@ -21,8 +21,9 @@ from truearm.cell.plan import (
 from truearm.cell.poses_file import Poses
 from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
-from truearm.endpoints import at_target
 from truearm.errors import UsageError
+from truearm.fits.endpoints import at_target
+from truearm.fits.stillness import still_joints
 from truearm.measurements import Measurements
 from truearm.planning.accessibility import Rule
 from truearm.proposing import (
@@ -34,7 +35,6 @@ from truearm.proposing import (
     next_poses,
 )
 from truearm.robot import Robot
-from truearm.stillness import still_joints
 from truearm.updating import UpdateOptions
 
 Floats = NDArray[np.float64]

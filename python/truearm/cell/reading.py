@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.arrays import rotation_fault
 from truearm.cell.device_errors import MEND_THE_DRIVER, MalformedReadingError
-from truearm.columns import PURPOSE, means_something
+from truearm.tables.columns import PURPOSE, means_something
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from truearm.errors import list_names, typed
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
+    from truearm.fits.options import Options
     from truearm.measurements import Measurements
-    from truearm.options import Options
     from truearm.updating import UpdateOptions
 
 FIELD: Final = "field"
@@ -112,7 +112,7 @@ def calibrate_again(calibration: "Calibration", robot: str | None, more: str) ->
 def plan_anew(calibration: "Calibration") -> str:
     """The command that plans as many poses as a calibration was learned from."""
     from truearm.cli.naming import name_of
-    from truearm.visits import pose_count
+    from truearm.rows.visits import pose_count
 
     learned = calibration.learned_from
     poses = calibration.validation.n_train_poses if learned is None else pose_count(learned.data)

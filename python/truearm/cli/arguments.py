@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final, TypeAlias, get_type_hints
 import typer
 from typer.models import ParameterInfo
 
+from truearm.description.library import library_names
 from truearm.errors import UsageError
-from truearm.library import library_names
 
 CHOICE: Final = re.compile(r"[a-z0-9][a-z0-9_-]*")
 ROBOT_HELP: Final = "A library name, a TOML file or a URDF (FILE.urdf#TIP)."

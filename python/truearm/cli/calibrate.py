@@ -23,12 +23,12 @@ from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
 from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, remove, write_whole
-from truearm.scheme_options import SchemeOptions
+from truearm.fits.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
+    from truearm.fits.options import Options
     from truearm.measurements import Measurements
-    from truearm.options import Options
     from truearm.robot import Robot
 
 SCHEME = SchemeOptions()
@@ -80,8 +80,8 @@ def command(
       truearm calibrate arm.toml monday.csv tuesday.csv -o result
       truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
+    from truearm.fits.options import Options
     from truearm.measurements import Measurements
-    from truearm.options import Options
     from truearm.robot import Robot
 
     options = Options.of(
@@ -144,7 +144,7 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
 
     Where compensation would refuse most measured rows, it is said why, and which option allows them.
     """
-    from truearm.doubts import OF_NO_USE, ORIENTATION_MISFIT
+    from truearm.doubts.of_results import OF_NO_USE, ORIENTATION_MISFIT
     from truearm.reporting.facts import Facts
 
     if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
@@ -270,8 +270,8 @@ def _judged_in_words(calibration: "Calibration") -> str:
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
-    from truearm.models import CONSTANT, leaves_noise
-    from truearm.summary import states_sigma
+    from truearm.fits.models import CONSTANT, leaves_noise
+    from truearm.storage.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
     if len(calibration.selection.targets) > 1:
@@ -294,7 +294,7 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
 
 def print_determined(calibration: "Calibration") -> None:
     """Say which parameters the measurements determine, and what the others cannot be told from."""
-    from truearm.summary import saw_orientations
+    from truearm.storage.summary import saw_orientations
 
     found = calibration.identifiability
     say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
@@ -332,7 +332,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
-    from truearm.doubts import Outliers
+    from truearm.doubts.of_results import Outliers
     from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT, fate_of_outliers
 
     if not outliers or calibration.rows is None:

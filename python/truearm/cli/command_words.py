@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from truearm.options import Options
+    from truearm.fits.options import Options
     from truearm.updating import UpdateOptions
 
 RENAMED: Final = {"most_regions": "regions"}
@@ -50,7 +50,7 @@ def update_lacks(options: "UpdateOptions") -> list[str]:
 
 
 def _of_calibrate(options: "Options") -> dict[str, Any]:
-    from truearm.options import Options
+    from truearm.fits.options import Options
 
     return _unusual(options.to_dict(), Options().to_dict())
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from truearm.cli.console import print_table
-from truearm.validation import Errors, Statistics
+from truearm.judgement.validation import Errors, Statistics
 
 HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
 

@@ -98,9 +98,9 @@ def _found_words(found: "Evaluation") -> str:
 
 def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update: str) -> list[str]:
     """What to do with a calibration that was judged: `update` it where the arm is not as it was."""
-    from truearm.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
-    from truearm.doubts import OF_NO_USE
-    from truearm.gross_rows import FAR_ROWS
+    from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
+    from truearm.doubts.gross_rows import FAR_ROWS
+    from truearm.doubts.of_results import OF_NO_USE
 
     kinds = {notice.kind for notice in found.notices}
     if NOT_AS_CALIBRATED in kinds:

@@ -55,8 +55,8 @@ def command(
       truearm import book.xlsx --sheet "Day 2" -o m.csv --joint-unit deg
     """
     from truearm.importing import ImportPlan, import_table
-    from truearm.raw_tables import Marks
-    from truearm.rotation_columns import RotationColumns
+    from truearm.tables.raw_tables import Marks
+    from truearm.tables.rotation_columns import RotationColumns
 
     stated = (with_names, with_delimiter, with_decimal, with_skip_lines, with_sheet, with_encoding)
     other = _other(second or [], asked=any(mark is not None for mark in stated))
@@ -155,7 +155,7 @@ def _delimiter(text: str | None, option: str) -> str | None:
         return None
     mark = DELIMITER_WORDS.get(text, text)
     if len(mark) != 1:
-        from truearm.reading import quoted_delimiter
+        from truearm.tables.reading import quoted_delimiter
 
         raise UsageError(
             f'"{text}" is no delimiter',

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Final
 
-from truearm.library import library_names
+from truearm.description.library import library_names
 
 if TYPE_CHECKING:
     from truearm.robot import Robot

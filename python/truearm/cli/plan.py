@@ -311,7 +311,7 @@ def _print_proposed(
 
 
 def _print_still(kept: Mapping[int, float], joints: Sequence[str]) -> None:
-    from truearm.stillness import still_words
+    from truearm.fits.stillness import still_words
 
     if kept:
         say_wrapped(

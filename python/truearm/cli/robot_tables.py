@@ -3,9 +3,9 @@
 import numpy as np
 
 from truearm.cli.console import print_json, print_table, say, say_wrapped, warn
+from truearm.description.robot_checks import robot_notices
 from truearm.errors import Notice, count_of
 from truearm.robot import Robot
-from truearm.robot_checks import robot_notices
 from truearm.units import MM_PER_METRE
 
 LETTER = {"revolute": "R", "prismatic": "P"}

@@ -6,8 +6,8 @@ import typer
 
 from truearm.cli.arguments import ROBOT_HELP, AsJson, robots_like
 from truearm.cli.console import print_json, print_table, suggest
+from truearm.description.library import library_names
 from truearm.errors import typed
-from truearm.library import library_names
 
 
 def command(

@@ -177,7 +177,7 @@ def _words(given: str | None) -> tuple[str, ...]:
 
 def _warn_of(study: "Study") -> None:
     """Read all sets before any work, and say what is to be known of them; refuse what none can answer."""
-    from truearm.splitting import split_columns
+    from truearm.rows.splitting import split_columns
     from truearm.studies.accuracy.cells import check_askable
     from truearm.studies.accuracy.sets import read_set
 

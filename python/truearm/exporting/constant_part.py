@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.dh_row import row_transform
-from truearm.models import CONSTANT
+from truearm.description.dh_row import row_transform
+from truearm.fits.models import CONSTANT
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]

@@ -14,10 +14,10 @@ from truearm.calibration import Calibration
 from truearm.errors import UsageError, WorkError
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
-from truearm.parameters import KINDS
+from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
-from truearm.summary import WAVE, describe_blocks, waves_in_words
+from truearm.storage.summary import WAVE, describe_blocks, waves_in_words
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]

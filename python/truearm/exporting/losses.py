@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from truearm.calibration import Calibration
-from truearm.doubts import Outliers
+from truearm.description.robot_data import RobotData
+from truearm.doubts.of_results import Outliers
 from truearm.errors import list_rows
-from truearm.models import CONSTANT
-from truearm.parameters import BETA
-from truearm.robot_data import RobotData
+from truearm.fits.models import CONSTANT
+from truearm.fits.parameters import BETA
 
 ONLY_ROS: Final = (
     "This changes the model that ROS computes with, and with it plans, transforms and visualisation. It does "

@@ -7,10 +7,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.description.robot_data import RobotData
+from truearm.description.urdf_names import UrdfNames
 from truearm.exporting.losses import is_directed
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
-from truearm.robot_data import RobotData
-from truearm.urdf_names import UrdfNames
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.dh_row import row_transform
-from truearm.robot_data import RobotData
+from truearm.description.dh_row import row_transform
+from truearm.description.robot_data import RobotData
 
 Floats = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.dh_from_axes import Axis
+from truearm.description.dh_from_axes import Axis
+from truearm.description.joint_axes import axes_at_zero
+from truearm.description.robot_data import RobotData
+from truearm.description.urdf_ends import MOVING
+from truearm.description.urdf_names import UrdfNames
+from truearm.description.xml_as_written import xml_as_written
 from truearm.errors import WorkError
 from truearm.exporting.losses import is_directed
 from truearm.exporting.new_urdf import set_origin
-from truearm.joint_axes import axes_at_zero
-from truearm.robot_data import RobotData
 from truearm.rotations import matrix_from_euler, matrix_from_rotation_vector, rigid_inverse
-from truearm.urdf_ends import MOVING
-from truearm.urdf_names import UrdfNames
-from truearm.xml_as_written import xml_as_written
 
 Floats = NDArray[np.float64]
 

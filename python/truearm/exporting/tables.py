@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import checked, flange_poses
-from truearm.parameters import KINDS
+from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
 from truearm.exporting.losses import as_comments, is_directed
 from truearm.exporting.new_urdf import default_names, new_urdf
@@ -14,7 +15,6 @@ from truearm.exporting.parity import checked, flange_poses, largest_difference
 from truearm.exporting.patched_urdf import patched_urdf
 from truearm.files import read_text
 from truearm.robot import Robot
-from truearm.urdf_names import UrdfNames
 
 NOMINAL_WITHIN_M: Final = 1e-4
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.doubts import helps, nothing_to_gain
+from truearm.doubts.of_results import helps, nothing_to_gain
 from truearm.fleet.fleet_file import LimitsSection
 
 Row = Mapping[str, Any]

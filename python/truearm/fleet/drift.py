@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
+from truearm.doubts.nominal_misfit import some_rows
 from truearm.errors import InputError, WorkError
+from truearm.fits.identified import Frame
+from truearm.fits.models import CONSTANT
+from truearm.fits.parameters import are_lengths
 from truearm.fleet.gauge import as_placed_in
-from truearm.identified import Frame
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT
-from truearm.nominal_misfit import some_rows
-from truearm.parameters import are_lengths
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 

@@ -11,8 +11,8 @@ from pydantic import BeforeValidator, Field
 from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed, read_text
+from truearm.fits.options import Options
 from truearm.fleet.keys import in_keys
-from truearm.options import Options
 
 ARM_NAME: Final = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 PLACEHOLDER: Final = "{arm}"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.parameters import KIND_COUNT
+from truearm.fits.parameters import KIND_COUNT
 
 Floats = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ import re
 from dataclasses import fields
 from typing import Final
 
-from truearm.options import CHOICES, Options
-from truearm.scheme_options import SchemeOptions
-from truearm.splitting import SplitRule
+from truearm.fits.options import CHOICES, Options
+from truearm.fits.scheme_options import SchemeOptions
+from truearm.rows.splitting import SplitRule
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
 
 OPTION: Final = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: (\w+(?:\.\d+)?))?")

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from truearm.errors import list_outliers
+from truearm.fits.models import NOMINAL
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD, Reason, order, reasons
 from truearm.fleet.fleet_file import Fleet
 from truearm.fleet.keys import in_keys
 from truearm.fleet.task import ArmMade
-from truearm.models import NOMINAL
 from truearm.workers import is_expected
 
 DONE: Final = "done"

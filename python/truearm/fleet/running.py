@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from truearm.errors import TruearmError
 from truearm.files import make_directory, write_whole
-from truearm.fitting import Stages, no_stages
+from truearm.fits.fitting import Stages, no_stages
 from truearm.fleet.attention import FAILED
 from truearm.fleet.fleet_file import Entry, Fleet
 from truearm.fleet.inputs import Inputs, find_inputs

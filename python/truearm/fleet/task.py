@@ -6,14 +6,14 @@ from typing import Any
 
 from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
+from truearm.doubts.points_together import points_together
+from truearm.fits.options import Options
 from truearm.fleet.doubted import grave_notices
 from truearm.fleet.drift import check_comparable, drift_of
 from truearm.measurements import Measurements
-from truearm.options import Options
-from truearm.points_together import points_together
 from truearm.reporting.report import report
 from truearm.robot import Robot
-from truearm.summary import distance_at_floor_mm
+from truearm.storage.summary import distance_at_floor_mm
 
 
 @dataclass(frozen=True, eq=False)

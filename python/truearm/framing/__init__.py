@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, check_finite, rotation_fault
 from truearm.calibration import Calibration
-from truearm.endpoints import at_tool
+from truearm.doubts.plausibility import check_points, check_readings
 from truearm.errors import InputError, Notice, UsageError
+from truearm.fits.endpoints import at_tool
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.frames_toml import former_entry, tip_covariance, write_frame
 from truearm.framing.identified_frame import IdentifiedFrame
@@ -19,7 +20,6 @@ from truearm.framing.placing import object_from_points
 from truearm.framing.touching import tool_from_touches
 from truearm.kinds import required
 from truearm.measurements import Measurements
-from truearm.plausibility import check_points, check_readings
 from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.special import fdtri
 
 from truearm.errors import InputError, Notice, WorkError, list_rows
-from truearm.leaving_out import left_out
 from truearm.lengths import length_mm
 from truearm.registration import register
+from truearm.rows.leaving_out import left_out
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]

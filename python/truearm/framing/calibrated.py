@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.fitting import feature_values
+from truearm.fits.fitting import feature_values
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]

@@ -5,18 +5,18 @@ from numpy.typing import NDArray
 
 from truearm._core import fit_constant
 from truearm.calibration import Calibration
-from truearm.core_set import Selection, core_set, select
-from truearm.enough_values import frame_unknowns
+from truearm.doubts.turning_sense import check_turns
 from truearm.errors import WorkError
-from truearm.fitting import Task, core_errors, fit_options
+from truearm.fits.core_set import Selection, core_set, select
+from truearm.fits.enough_values import frame_unknowns
+from truearm.fits.fitting import Task, core_errors, fit_options
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.framing.turning import check_turned
-from truearm.judging import model_inputs
+from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_motion
-from truearm.turning_sense import check_turns
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers
-from truearm.endpoints import at_tool
+from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, UsageError
-from truearm.joint_axes import axes_at_zero
+from truearm.fits.endpoints import at_tool
 from truearm.planning.configurations import link_frames
 from truearm.robot import Robot
 

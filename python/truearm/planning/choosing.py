@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm import kinds
 from truearm._core import CoreError, Problem, choose_poses, independent_columns, linearise, setup_jacobian
-from truearm.core_set import known_setup, measured_points
-from truearm.endpoints import at_tool
 from truearm.errors import UsageError, WorkError
-from truearm.identified import IdentifiedArm
-from truearm.parameters import THETA, D
+from truearm.fits.core_set import known_setup, measured_points
+from truearm.fits.endpoints import at_tool
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.parameters import THETA, D
 
 Floats = NDArray[np.float64]
 Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm._core import CoreError, Regions, divide
-from truearm.core_set import known_setup
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.files import read_text, write_whole
-from truearm.identified import IdentifiedArm
+from truearm.fits.core_set import known_setup
+from truearm.fits.identified import IdentifiedArm
 from truearm.planning.choosing import CRITERIA, Criterion, check_some
 from truearm.planning.workspace import Workspace
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet
-from truearm.core_set import measured_points
 from truearm.errors import InputError
+from truearm.fits.core_set import measured_points
 from truearm.planning.accessibility import Rule
 from truearm.planning.pool import PoolOptions, draw_pool
 from truearm.planning.spaces import Space

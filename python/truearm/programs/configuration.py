@@ -10,9 +10,9 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.description.robot_data import RobotData
 from truearm.programs.layouts import Layout
 from truearm.programs.tables import Targets
-from truearm.robot_data import RobotData
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -15,7 +15,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import JOINT, QUATERNION, TARGET
 from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
@@ -23,9 +22,10 @@ from truearm.programs.program import BlendsShortened, LinearStep, Program, StepT
 from truearm.programs.scanning import NumberColumns, Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
-from truearm.reading import DELIMITERS
 from truearm.robot import Robot
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
+from truearm.tables.columns import JOINT, QUATERNION, TARGET
+from truearm.tables.reading import DELIMITERS
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.controller import Controller
+from truearm.description.one_turn import one_turn
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.one_turn import one_turn
 from truearm.programs.program import Language, Program
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE

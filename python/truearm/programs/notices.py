@@ -7,6 +7,7 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, list_names, typed
+from truearm.fits.stillness import carried_joints, moved_joints, still_words
 from truearm.inputs import PAYLOAD_KG, is_payload
 from truearm.programs.declaring import maker_of
 from truearm.programs.environment import Environment, Frame
@@ -15,7 +16,6 @@ from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
-from truearm.stillness import carried_joints, moved_joints, still_words
 
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from truearm._core import Problem, Setup, linearise, setup_jacobian
 from truearm.arrays import as_rows
 from truearm.calibration import Calibration
-from truearm.core_set import Selection, measured_points
-from truearm.enough_values import setup_unknowns
+from truearm.certainty.uncertainty import task_of
 from truearm.errors import UsageError, WorkError, count_of, list_names
+from truearm.fits.core_set import Selection, measured_points
+from truearm.fits.enough_values import setup_unknowns
 from truearm.kinds import required
-from truearm.uncertainty import task_of
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import usual_sigma_m
 

@@ -6,7 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import (
+from truearm.doubts.grids import BETWEEN
+from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.doubts.of_results import (
     CONSTANT_BETTER,
     EXCHANGED,
     FEW_VALUES,
@@ -18,18 +20,16 @@ from truearm.doubts import (
     WOULD_FIT,
     to_check,
 )
+from truearm.doubts.row_order import ORDER_OF_POSES
+from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
-from truearm.grids import BETWEEN
-from truearm.models import CONSTANT, VARIABLE, leaves_noise
-from truearm.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
 from truearm.reporting.numbers import fixed, listed, percent, short, shown_readings
-from truearm.row_order import ORDER_OF_POSES
-from truearm.summary import saw_orientations
-from truearm.uneven_setups import UNEVEN_SETUPS
+from truearm.storage.summary import saw_orientations
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25

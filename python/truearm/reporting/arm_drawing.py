@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain
-from truearm.parameters import A, D
+from truearm.fits.parameters import A, D
 from truearm.reporting.numbers import lean
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE

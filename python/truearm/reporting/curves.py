@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.models import VARIABLE
+from truearm.fits.models import VARIABLE
 from truearm.reporting.charts import EVERY_NAME, axis, band, colour_bar, line
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, lean, short, significant
@@ -14,7 +14,7 @@ from truearm.reporting.parts import Choice, Figure
 from truearm.reporting.style import SEQUENTIAL
 from truearm.reporting.sweeps import deviations, feature_ends, moved_mm, own_name, sweep, swept_names
 from truearm.reporting.waves import strongest_wave
-from truearm.summary import waves_in_words
+from truearm.storage.summary import waves_in_words
 
 Floats = NDArray[np.float64]
 

@@ -6,15 +6,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.details import DriftDetails
-from truearm.fitted_rows import FittedRows
+from truearm.fits.details import DriftDetails
+from truearm.fits.fitted_rows import FittedRows
+from truearm.judgement.validation import at_first_measured
 from truearm.reporting.charts import axis, legend, line, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import listed, short
 from truearm.reporting.parts import Figure
 from truearm.reporting.style import colour_of, marker_of
 from truearm.units import MM_PER_METRE
-from truearm.validation import at_first_measured
 
 Floats = NDArray[np.float64]
 

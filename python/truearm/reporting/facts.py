@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from truearm._core import Field
 from truearm.calibration import Calibration
-from truearm.doubts import ON_A_GRID, SINGLE_ROWS, Outliers, helps, nothing_to_gain
+from truearm.description.one_turn import one_turn
+from truearm.doubts.grids import grid_steps, grid_words
+from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, Outliers, helps, nothing_to_gain
 from truearm.evaluation import Evaluation
-from truearm.grids import grid_steps, grid_words
-from truearm.held_rows import HeldRows
-from truearm.models import NOMINAL, ArmModel
-from truearm.one_turn import one_turn
+from truearm.fits.models import NOMINAL, ArmModel
+from truearm.fits.stillness import still_warning
+from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.reporting.waypoints import Waypoints
-from truearm.stillness import still_warning
-from truearm.summary import WAVE, distance_at_floor_mm
+from truearm.storage.summary import WAVE, distance_at_floor_mm
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain, non_negative_least_squares
-from truearm.doubts import UPRIGHT
-from truearm.models import CONSTANT
+from truearm.doubts.of_results import UPRIGHT
+from truearm.fits.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import percent, short

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import count_of, short_names
-from truearm.held_rows import HeldRows
+from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.charts import axis, legend, line, log_axis, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.parameters import KIND_COUNT, THETA, D
+from truearm.fits.parameters import KIND_COUNT, THETA, D
 from truearm.reporting.facts import Facts
 from truearm.units import MM_PER_METRE
 

@@ -4,8 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.as_calibrated import NOT_AS_CALIBRATED
-from truearm.doubts import OF_NO_USE
+from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED
+from truearm.doubts.of_results import OF_NO_USE
 from truearm.evaluation import Evaluation
 from truearm.reporting.advice import Advice
 from truearm.reporting.facts import ROWS, Facts

@@ -5,15 +5,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.certainty.standard_errors import of_covariance
 from truearm.errors import count_of
-from truearm.models import CONSTANT
-from truearm.parameters import KIND_COUNT, KINDS
+from truearm.fits.models import CONSTANT
+from truearm.fits.parameters import KIND_COUNT, KINDS
 from truearm.reporting.charts import EVERY_NAME, axis, colour_bar
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
-from truearm.standard_errors import of_covariance
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Chapter: the parameters of the model that predicts, and those of the constant one."""
 
-from truearm.models import CONSTANT
+from truearm.fits.models import CONSTANT
 from truearm.reporting.facts import Facts
 from truearm.reporting.parameters import confounding, table
 from truearm.reporting.parts import Part, Section, Text

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from truearm.errors import count_of, short_names
-from truearm.options import Options
+from truearm.fits.options import Options
 from truearm.outlier_fate import fate_of_outliers, taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed

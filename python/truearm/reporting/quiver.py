@@ -6,8 +6,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.held_rows import HeldRows
-from truearm.models import CONSTANT, NOMINAL
+from truearm.fits.models import CONSTANT, NOMINAL
+from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.arm_drawing import arm_traces
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import vectors_mm

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import count_of
+from truearm.fits.schemes import RegionalCeps
 from truearm.reporting.axes import input_axis
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
@@ -12,7 +13,6 @@ from truearm.reporting.numbers import lean, short
 from truearm.reporting.parameters import effect_mm
 from truearm.reporting.parts import Figure
 from truearm.reporting.style import SEQUENTIAL
-from truearm.schemes import RegionalCeps
 
 MOST: Final = 600
 """Regions that are drawn; deeper ones are left out."""

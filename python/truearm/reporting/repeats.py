@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import APPROACH, REPEAT
 from truearm.errors import count_of
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
@@ -15,10 +14,11 @@ from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, lean, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
+from truearm.rows.visits import pose_numbers, visit_numbers
 from truearm.simulation import approach_in_sequence
-from truearm.summary import states_sigma, whole_noise_mm
+from truearm.storage.summary import states_sigma, whole_noise_mm
+from truearm.tables.columns import APPROACH, REPEAT
 from truearm.units import MM_PER_METRE
-from truearm.visits import pose_numbers, visit_numbers
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

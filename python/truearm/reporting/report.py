@@ -6,7 +6,7 @@ from typing import Any
 
 from truearm.calibration import Calibration
 from truearm.evaluation import Evaluation
-from truearm.fitting import Stages, no_stages
+from truearm.fits.fitting import Stages, no_stages
 from truearm.reporting.advice import MOST, Advice, advise
 from truearm.reporting.corrections import compensation
 from truearm.reporting.facts import Facts

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Field
+from truearm.fits.stillness import still_joints, still_words
 from truearm.reporting.axes import JointAxis, ends, input_axis, places, readings_at
 from truearm.reporting.charts import axis, heatmap
 from truearm.reporting.facts import Facts
@@ -13,7 +14,6 @@ from truearm.reporting.numbers import fixed, listed
 from truearm.reporting.parameters import effect_mm
 from truearm.reporting.parts import Choice, Figure, Part, Text
 from truearm.reporting.style import DIVERGING
-from truearm.stillness import still_joints, still_words
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.models import CONSTANT
+from truearm.fits.models import CONSTANT
 from truearm.reporting.charts import axis, data_points, heatmap
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import STRETCHES, Known, configurations, means_along, std_mm

@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, Final
 
-from truearm.models import CONSTANT, VARIABLE
+from truearm.fits.models import CONSTANT, VARIABLE
 from truearm.reporting.axes import coupling_words
 from truearm.reporting.curves import along, influence
 from truearm.reporting.facts import Facts
@@ -14,7 +14,7 @@ from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.region_tree import region_tree
 from truearm.reporting.slices import slices
 from truearm.reporting.sweeps import influence_mm
-from truearm.summary import WAVE, waves_in_words
+from truearm.storage.summary import WAVE, waves_in_words
 
 Block = dict[str, Any]
 

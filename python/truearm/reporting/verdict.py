@@ -4,14 +4,14 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import NEAR_MM, gains_nothing, helps, nothing_to_gain
+from truearm.doubts.of_results import NEAR_MM, gains_nothing, helps, nothing_to_gain
 from truearm.errors import count_of
-from truearm.models import NOMINAL, leaves_noise
+from truearm.fits.models import NOMINAL, leaves_noise
+from truearm.judgement.validation import Statistics
 from truearm.outlier_fate import taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
-from truearm.validation import Statistics
 
 GOOD: Final = 0.6
 """A calibration that leaves less than this part of the error is a good one."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.errors import InputError, did_you_mean
-from truearm.parameters import KINDS
+from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
 from truearm.rotations import (
     matrix_from_quaternion,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, Regions, Setup
-from truearm.core_set import known_setup, measured_points
 from truearm.defaults import PAPER_POSES
-from truearm.identified import IdentifiedArm
+from truearm.fits.core_set import known_setup, measured_points
+from truearm.fits.identified import IdentifiedArm
 from truearm.planning.dividing import DivisionOptions, divide_space, named_columns
 from truearm.planning.pool import PoolOptions, needed_pool
 from truearm.planning.spaces import Space

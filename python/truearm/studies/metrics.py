@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M, Chain
-from truearm.parameters import KIND_COUNT, A, D
+from truearm.fits.parameters import KIND_COUNT, A, D
 from truearm.studies.experiment import Experiment
 from truearm.studies.schemes import Scheme
 from truearm.units import MM_PER_METRE

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truearm.files import write_whole
-from truearm.parameters import ALPHA, THETA, A, D
+from truearm.fits.parameters import ALPHA, THETA, A, D
 from truearm.studies.paper import Drawn
 from truearm.units import MM_PER_METRE
 

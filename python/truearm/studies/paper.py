@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import UsageError
-from truearm.fitting import no_stages
+from truearm.fits.fitting import no_stages
 from truearm.planning.pool import PoolOptions, draw_pool
 from truearm.studies.experiment import Experiment, Plan, conduct
 from truearm.studies.metrics import Trace, along, over_seeds, sizes, trace

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.fitting import no_stages
+from truearm.fits.fitting import no_stages
 from truearm.studies.claims import judged
 from truearm.studies.division_picture import save_division
 from truearm.studies.experiment import Plan, conduct

@@ -9,12 +9,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm._core import Network, Regions, Training, fill_without_data, linearise, regional_ceps
-from truearm.core_set import Selection
-from truearm.fitting import Hyper, KnownHyper, Task, fit_rows
+from truearm.fits.core_set import Selection
+from truearm.fits.fitting import Hyper, KnownHyper, Task, fit_rows
+from truearm.fits.models import VARIABLE
+from truearm.fits.options import Options
+from truearm.fits.schemes import add_ceps, training_pairs
 from truearm.measurements import Measurements
-from truearm.models import VARIABLE
-from truearm.options import Options
-from truearm.schemes import add_ceps, training_pairs
 from truearm.studies.experiment import Experiment
 from truearm.units import MM_PER_METRE
 

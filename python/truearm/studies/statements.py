@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from truearm._core import Network, independent_columns
-from truearm.identified import IdentifiedArm
-from truearm.parameters import ALPHA, BETA, A, D
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.parameters import ALPHA, BETA, A, D
 from truearm.planning.dividing import named_columns
 from truearm.simulation import PAPER_PARAMETERS, VirtualArm
 from truearm.studies.schemes import NETWORK

@@ -8,8 +8,10 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
-from truearm.core_set import select_fitted
-from truearm.doubts import LARGE_MM
+from truearm.doubts.of_results import LARGE_MM
+from truearm.doubts.plausibility import check_against
+from truearm.doubts.points_together import points_together
+from truearm.doubts.turning_sense import check_turns
 from truearm.errors import (
     InputError,
     Notice,
@@ -20,14 +22,14 @@ from truearm.errors import (
     in_words,
     list_names,
 )
-from truearm.fitted_rows import known_rows, overwhelming
-from truearm.fitting import Stages, Task, no_stages
+from truearm.fits.core_set import select_fitted
+from truearm.fits.fitted_rows import known_rows, overwhelming
+from truearm.fits.fitting import Stages, Task, no_stages
+from truearm.judgement.validation import Errors
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.plausibility import check_against
-from truearm.points_together import points_together
+from truearm.rows.visits import one_row_a_visit
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
-from truearm.turning_sense import check_turns
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
@@ -41,8 +43,6 @@ from truearm.updating.squares import SquaresTest, change_test, rest_test
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
-from truearm.validation import Errors
-from truearm.visits import one_row_a_visit
 
 Verdict = Literal["holds", "moved", "field"]
 

@@ -10,14 +10,14 @@ from scipy.linalg import block_diag
 
 from truearm._core import Setup
 from truearm.calibration import Calibration
-from truearm.core_set import Selection
-from truearm.details import left_m
-from truearm.enough_values import setup_unknowns
+from truearm.certainty.uncertainty import task_of
 from truearm.errors import Notice, list_names
-from truearm.measured_parts import MeasuredParts, sureness
+from truearm.fits.core_set import Selection
+from truearm.fits.details import left_m
+from truearm.fits.enough_values import setup_unknowns
+from truearm.fits.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
 from truearm.revision import Carried
-from truearm.uncertainty import task_of
 from truearm.updating.parts import places_of
 from truearm.updating.scale import sigmas_m
 from truearm.updating.scene import Scene

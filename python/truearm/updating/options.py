@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from truearm.core_set import Use
 from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError
+from truearm.fits.core_set import Use
 from truearm.kinds import check_values, settle
 
 

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Setup
-from truearm.core_set import Selection
-from truearm.enough_values import FRAME_UNKNOWNS
-from truearm.identified import IdentifiedArm
+from truearm.fits.core_set import Selection
+from truearm.fits.enough_values import FRAME_UNKNOWNS
+from truearm.fits.identified import IdentifiedArm
 
 
 def part_of(setup: Setup, used: Selection, fitted: Selection) -> Setup:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, WorkError, count_of
-from truearm.known_scale import KnownScale
+from truearm.fits.known_scale import KnownScale
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.units import MM_PER_METRE

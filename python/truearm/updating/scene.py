@@ -10,14 +10,14 @@ from scipy.linalg import block_diag
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
-from truearm.core_set import core_set, rotations
-from truearm.dh_row import row_transform
-from truearm.enough_values import FRAME_UNKNOWNS, setup_unknowns
-from truearm.fitting import Task, core_errors, fit_options
-from truearm.judging import model_inputs
+from truearm.certainty.uncertainty import noises_of, task_of
+from truearm.description.dh_row import row_transform
+from truearm.fits.core_set import core_set, rotations
+from truearm.fits.enough_values import FRAME_UNKNOWNS, setup_unknowns
+from truearm.fits.fitting import Task, core_errors, fit_options
+from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
-from truearm.uncertainty import noises_of, task_of
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import sigmas_m
 from truearm.updating.unknowns import Unknowns, is_part_of

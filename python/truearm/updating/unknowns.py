@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.core_set import Selection
-from truearm.enough_values import FRAME_UNKNOWNS
-from truearm.fitting import Task
-from truearm.identified import IdentifiedArm
-from truearm.measured_parts import MeasuredParts
+from truearm.fits.core_set import Selection
+from truearm.fits.enough_values import FRAME_UNKNOWNS
+from truearm.fits.fitting import Task
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.measured_parts import MeasuredParts
+from truearm.fits.parameters import KIND_COUNT, KINDS, THETA, D, are_lengths
 from truearm.measurements import Measurements
-from truearm.parameters import KIND_COUNT, KINDS, THETA, D, are_lengths
 from truearm.units import to_si
 from truearm.updating.options import UpdateOptions
 

@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
-from truearm.details import ConstantDetails
+from truearm.certainty.standard_errors import of_covariance
+from truearm.certainty.uncertainty import UpdatedSpread
 from truearm.errors import Notice, in_words
-from truearm.fitted_rows import TRAINED, FittedRows, farthest_m
-from truearm.held_rows import HeldRows
-from truearm.judging import judge
-from truearm.models import NOMINAL, ArmModel
+from truearm.fits.details import ConstantDetails
+from truearm.fits.fitted_rows import TRAINED, FittedRows, farthest_m
+from truearm.fits.models import NOMINAL, ArmModel
+from truearm.judgement.held_rows import HeldRows
+from truearm.judgement.judging import judge
+from truearm.judgement.validation import RowErrors, Validation
 from truearm.revision import Carried, Revision
-from truearm.standard_errors import of_covariance
-from truearm.uncertainty import UpdatedSpread
 from truearm.updating.carrying import carried
 from truearm.updating.estimating import Estimate
 from truearm.updating.kept_parts import KeptParts
 from truearm.updating.scene import Scene
 from truearm.updating.validating import setup_of
-from truearm.validation import RowErrors, Validation
 
 Floats = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
-from truearm.core_set import core_set
-from truearm.fitting import core_errors, fit_options
-from truearm.judging import model_inputs
+from truearm.fits.core_set import core_set
+from truearm.fits.fitting import core_errors, fit_options
+from truearm.fits.models import NOMINAL, ArmModel
+from truearm.judgement.judging import model_inputs
+from truearm.judgement.validation import RowErrors, at_first_measured, row_errors
 from truearm.measurements import Measurements
-from truearm.models import NOMINAL, ArmModel
 from truearm.updating.estimating import Estimate, folds, left_out
 from truearm.updating.scene import Scene
-from truearm.validation import RowErrors, at_first_measured, row_errors
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import NORMAL_95, residuals
-from truearm.core_set import core_set
-from truearm.judging import model_inputs
+from truearm.fits.core_set import core_set
+from truearm.fits.models import ArmModel
+from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
-from truearm.models import ArmModel
 from truearm.studies.accuracy.poses import Poses, Prepared
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from truearm.errors import TruearmError
-from truearm.models import CONSTANT
+from truearm.fits.models import CONSTANT
+from truearm.judgement.validation import Statistics
 from truearm.studies.accuracy.cells import Cell
 from truearm.studies.accuracy.fitted import Fitted
 from truearm.studies.accuracy.libraries import one_thread
@@ -19,7 +20,6 @@ from truearm.studies.accuracy.methods import BY_NAME, Effort
 from truearm.studies.accuracy.poses import Prepared, prepare
 from truearm.studies.accuracy.sets import read_set
 from truearm.studies.accuracy.splits import rows_of
-from truearm.validation import Statistics
 
 Record = dict[str, Any]
 

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain, Setup, linearise, setup_jacobian
-from truearm.core_set import Selection, core_set
-from truearm.fitting import Fits, Task, fit_rows
-from truearm.identified import IdentifiedArm
-from truearm.judging import model_inputs, setup_of_judged
+from truearm.fits.core_set import Selection, core_set
+from truearm.fits.fitting import Fits, Task, fit_rows
+from truearm.fits.identified import IdentifiedArm
+from truearm.fits.models import CONSTANT, ArmModel
+from truearm.fits.options import Options
+from truearm.fits.parameters import KIND_COUNT, D
+from truearm.judgement.judging import model_inputs, setup_of_judged
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, ArmModel
-from truearm.options import Options
-from truearm.parameters import KIND_COUNT, D
 from truearm.studies.accuracy.cells import Cell
 from truearm.studies.accuracy.sets import read_set
 from truearm.studies.accuracy.splits import rows_of

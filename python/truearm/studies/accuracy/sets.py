@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.doubts.plausibility import check_against
+from truearm.doubts.points_together import points_together
 from truearm.errors import InputError, Notice, UsageError
 from truearm.measurements import Measurements
-from truearm.plausibility import check_against
-from truearm.points_together import points_together
 from truearm.robot import Robot
-from truearm.visits import one_row_a_visit, pose_numbers
+from truearm.rows.visits import one_row_a_visit, pose_numbers
 
 
 @dataclass(frozen=True)

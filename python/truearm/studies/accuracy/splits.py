@@ -16,9 +16,9 @@ from scipy.cluster.vq import kmeans2
 
 from truearm.defaults import HOLDOUT
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.fits.stillness import still_joints
 from truearm.measurements import Measurements
-from truearm.splitting import HoldoutRange, Split, SplitRule, split_columns, split_rows
-from truearm.stillness import still_joints
+from truearm.rows.splitting import HoldoutRange, Split, SplitRule, split_columns, split_rows
 from truearm.studies.accuracy.sets import DataSet, Read, read_set
 
 Rows = NDArray[np.int64]

@@ -12,13 +12,13 @@ from truearm.cell.movemaster import readings_of, tenths
 from truearm.cell.ordering import paper_order
 from truearm.cell.poses_file import Poses
 from truearm.cell.virtual.world import true_arm
-from truearm.columns import VALIDATE
-from truearm.identified import IdentifiedArm
+from truearm.fits.identified import IdentifiedArm
 from truearm.planning.dividing import DividedSpace, DivisionOptions, divide_space
 from truearm.planning.workspace import Workspace
 from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.process.setting import DEMANDED_MM, Setting, cell_text, space
 from truearm.studies.setting import CANDIDATES
+from truearm.tables.columns import VALIDATE
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Final
 from truearm.cell.measuring import Progress
 from truearm.errors import InputError
 from truearm.files import make_directory, write_whole
-from truearm.fitting import no_stages
+from truearm.fits.fitting import no_stages
 from truearm.studies.metrics import over_seeds
 from truearm.studies.paper import Drawn
 from truearm.studies.process.conducting import Result, Stages, conduct_experiment

@@ -5,9 +5,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from truearm.fitting import fit_rows
-from truearm.models import CONSTANT, NOMINAL
-from truearm.schemes import FCMAC, REGIONS
+from truearm.fits.fitting import fit_rows
+from truearm.fits.models import CONSTANT, NOMINAL
+from truearm.fits.schemes import FCMAC, REGIONS
 from truearm.studies.accuracy.fitted import Fitted, FittedArm
 from truearm.studies.accuracy.poses import Prepared
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from truearm.parameters import are_lengths
+from truearm.fits.parameters import are_lengths
 from truearm.studies.accuracy.methods.searching import Effort, folds, search_rows
 from truearm.studies.accuracy.poses import Poses
 

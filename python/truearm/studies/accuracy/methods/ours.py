@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from truearm.fitting import Fits, Hyper, KnownHyper, Task, fit_rows
+from truearm.fits.fitting import Fits, Hyper, KnownHyper, Task, fit_rows
+from truearm.fits.models import VARIABLE
 from truearm.intervals import interval_coverage
-from truearm.models import VARIABLE
 from truearm.studies.accuracy.fitted import Fitted, FittedArm
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.poses import Prepared

@@ -7,9 +7,9 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.rows.visits import pose_numbers
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.poses import Poses
-from truearm.visits import pose_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -1,0 +1,1 @@
+"""How well a calibration is known: standard deviations and errors, exact and bounded."""

@@ -1,0 +1,441 @@
+"""Covariance of what a calibration predicts: the arm's part, and together with set-up and noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import CoreError, Posterior
+from truearm.errors import InputError, WorkError
+from truearm.fits.core_set import core_set
+from truearm.fits.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
+from truearm.fits.fitting import (
+    KnownHyper,
+    Task,
+    feature_values,
+    field_options,
+)
+from truearm.fits.measured_parts import MeasuredParts
+from truearm.fits.models import CONSTANT
+from truearm.revision import Carried
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LENGTHS: Final = (1, 2)
+"""Places of d and a among a link's parameters."""
+AXES: Final = 3
+AT_ONCE: Final = 512
+"""Configurations that an updated calibration is asked for together with the rows of its update."""
+MOTIONS: Final = FRAME_UNKNOWNS + AXES
+"""Of the base, and of the tool's place."""
+
+
+class Spread(Protocol):
+    """Knows how uncertain the arm's parameters are."""
+
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+        """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
+
+        With `moved` (n, m, 9 or 12), derivatives by motions of base and tool as in SetupPlace, it is that of
+        what the device of the set-up with most rows sees: what frame and target can take over counts no more.
+        """
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m) of the same, each of its own, with set-ups as in `joint`."""
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) of the same before any measurement."""
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m) of the same of all inputs with one another.
+
+        With `setup` (n, m, S), derivatives by the unknowns of all set-ups that were fitted, their part is
+        added. m is a multiple of three.
+        """
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint` of the `first` k inputs with the others."""
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """Covariance (n, m, m) of what a measurement shows anew; `orientation` (m,) tells rows in rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class SetupPlace:
+    """What of the unknowns of all set-ups is the frame and the target of one.
+
+    Attributes:
+        motion: Motion (12, S) of the base (translation, rotation vector), of the tool (translation in the
+            flange's frame, that of the middle of the targets, each as much as its rows are sure) and of the
+            measured orientation (rotation vector in the target's frame) with them; zero where nothing was
+            fitted. It is that of the set-up with most rows.
+        turning: The same of the set-up with most orientations, for how a target is turned.
+    """
+
+    motion: Floats
+    turning: Floats
+
+    @classmethod
+    def of(cls, task: Task, measured: MeasuredParts) -> "SetupPlace":
+        """Of the set-ups with most rows and most orientations, or the first where the file does not say."""
+        often = int(measured.rows.argmax())
+        turned = int(measured.orientations.argmax()) if measured.orientations.any() else often
+        return cls(_motion(task, measured, often), _motion(task, measured, turned))
+
+    def among_all(self, moved: Floats | None) -> Floats | None:
+        """Derivatives (n, m, S) by all of them, of those (n, m, k) by the first k motions."""
+        if moved is None:
+            return None
+        found = moved @ self.motion[: moved.shape[2]]
+        if moved.shape[2] > MOTIONS:
+            found[:, AXES:] = moved[:, AXES:] @ self.turning
+        return np.ascontiguousarray(found)
+
+
+def _motion(task: Task, measured: MeasuredParts, group: int) -> Floats:
+    """Motion (12, S) of base, tool and measured orientation with the unknowns of one set-up."""
+    frame, count = frame_unknowns(task), setup_unknowns(task)
+    width = count // len(task.groups)
+    start, end = group * width, (group + 1) * width
+    motion = np.zeros((MOTIONS + AXES, count))
+    motion[:frame, start : start + frame] = np.eye(frame)
+    for k, share in enumerate(measured.shares(group)[: len(task.selection.targets)]):
+        target = start + frame + AXES * k
+        motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = share * np.eye(AXES)
+    if measured.orientations[group]:
+        motion[MOTIONS:, end - AXES : end] = np.eye(AXES)
+    return motion
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantSpread:
+    """Constants: one covariance for the whole arm, and behind it of the set-ups.
+
+    What constants leave of the measurements, beside the rows' own sigma, is the arm's as far as anybody can
+    tell: it counts wherever the device's frame and target are taken over.
+    """
+
+    columns: list[int]
+    of_all: Floats
+    before: Floats
+    noises: tuple[float, float]
+    common: float
+    place: SetupPlace
+
+    @classmethod
+    def of(cls, calibration: "Calibration") -> "ConstantSpread":
+        """That of a calibration's constant model."""
+        columns = task_of(calibration).columns(calibration.constant.names)
+        length, angle, scaled = calibration.options.prior
+        scale = calibration.constant.prior_scale if scaled else 1.0
+        before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
+        details = calibration.constant
+        place = SetupPlace.of(task_of(calibration), calibration.measured)
+        noises = details.noise_m, details.noise_rad
+        common = 0.0 if details.scale is None else details.scale.common
+        return cls(columns, details.covariance, before**2, noises, common, place)
+
+    @property
+    def with_setup(self) -> Floats:
+        """Covariance (P + 9, P + 9) of the constants, and of the motions of base and tool behind them.
+
+        What the constants leave of positions is an uncertain place of the base, the same in all directions.
+        """
+        count = len(self.columns)
+        known = np.zeros((count + MOTIONS, len(self.of_all)))
+        known[:count, :count] = np.eye(count)
+        known[count:, count : count + self.place.motion.shape[1]] = self.place.motion[:MOTIONS]
+        found = known @ self.of_all @ known.T
+        found[count : count + AXES, count : count + AXES] += self.noises[0] ** 2 * np.eye(AXES)
+        return np.asarray(found)
+
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+        """Covariance (n, m, m), the same rule everywhere; with `moved` what the constants leave is added."""
+        found = self.each(inputs, jacobian, self.place.among_all(moved))
+        if moved is None:
+            return found
+        return found + np.diag(np.repeat(np.square(self.noises), AXES)[: jacobian.shape[1]])
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m), from that of constants and set-up."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        return np.asarray(rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1))
+
+    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
+        rows = jacobian[:, :, self.columns]
+        return rows if setup is None else np.concatenate([rows, setup], axis=2)
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) that the prior of the constants gives."""
+        return np.asarray(np.square(jacobian[:, :, self.columns]) @ self.before)
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m), from that of constants and set-up."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        rows = rows.reshape(-1, size)
+        return np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
+        return np.asarray(left @ self.of_all[:size, :size] @ right.T)
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """What no constant explains, alike everywhere; targets of one pose have part of it in common."""
+        noise = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
+        targets = int((~orientation).sum()) // AXES
+        together = np.kron(np.ones((targets, targets)) - np.eye(targets), np.eye(AXES))
+        noise[: len(together), : len(together)] += self.common * self.noises[0] ** 2 * together
+        return np.repeat(noise[None], len(jacobian), axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class VariableSpread:
+    """Constants and field: the exact posterior given the rows that were fitted."""
+
+    columns: list[int]
+    posterior: Posterior
+    inflation: float
+    noises: tuple[float, float]
+    place: SetupPlace
+
+    @classmethod
+    def of(cls, calibration: "Calibration") -> "VariableSpread":
+        """That of a calibration's variable model, from its rows.
+
+        Raises:
+            WorkError: If the rows were left out of the file.
+            InputError: If its hyper-parameters are of no arm.
+        """
+        rows, details = calibration.rows, calibration.variable
+        if rows is None or details is None:
+            raise WorkError(
+                "standard deviations need the measurements that the calibration was fitted to",
+                rule="They were left out of this file",
+                way_out="Use the file that still has them",
+            )
+        task = task_of(calibration)
+        data = rows.fitted
+        measured = core_set(calibration.robot, data, calibration.selection, calibration.groups, rows.weight)
+        values = feature_values(data, calibration.options.features)
+        names = calibration.identifiability.determined
+        options = field_options(task, names, values, details.feature_ranges, KnownHyper(details.hyper))
+        columns = list(calibration.arm.candidates.columns)
+        point = calibration.models[CONSTANT]
+        try:
+            posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
+        except CoreError as error:
+            raise InputError(str(error), where="the calibration's variable model") from None
+        place = SetupPlace.of(task, calibration.measured)
+        return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
+
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+        """Covariance (n, m, m) at inputs (n, I)."""
+        return self.each(inputs, jacobian, self.place.among_all(moved))
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m) at inputs (n, I), exact."""
+        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
+        return self.posterior.covariance(np.ascontiguousarray(inputs), chosen, setup) * self.inflation**2
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) that constants and field have before any measurement."""
+        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
+        return self.posterior.prior(np.ascontiguousarray(inputs), chosen) * self.inflation**2
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m), exact."""
+        found = self.posterior.joint_covariance(*_in_threes(inputs, jacobian[:, :, self.columns], setup))
+        return np.asarray(found * self.inflation**2)
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        asked = _in_threes(inputs, jacobian[:, :, self.columns], setup)
+        parts = jacobian.shape[1] // AXES
+        return np.asarray(self.posterior.cross_covariance(first * parts, *asked) * self.inflation**2)
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """Noise of the instrument, and what joints miss anew."""
+        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
+        instrument = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
+        return np.asarray(self.posterior.repeatability(chosen) + instrument) * self.inflation**2
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatedSpread:
+    """A calibration whose offsets were estimated again: what was uncertain before, and what they are now.
+
+    The offsets take up what of the errors before looked like them, so that an update of an update is no less
+    certain than one.
+
+    Attributes:
+        before: Of the calibration that was updated.
+        offsets: Derivatives (5 L, u) of the arm's parameters by what was estimated of the arm.
+        of_all: Covariance (u + S, u + S) of that and of all set-ups' unknowns, after the update.
+        carried: What became of the errors before; None in files that do not tell. Then both parts count in
+            full, though they have something in common, and the set-up is that of the calibration before.
+        place: What of the unknowns of all set-ups is the frame and the target of one.
+    """
+
+    before: Spread
+    offsets: Floats
+    of_all: Floats
+    carried: Carried | None
+    place: SetupPlace
+
+    @classmethod
+    def of(cls, calibration: "Calibration", before: Spread) -> "UpdatedSpread":
+        """That of an updated calibration."""
+        revision = calibration.revision
+        if revision is None:
+            raise WorkError("this calibration was not updated", rule="Only an updated one has this spread")
+        place = SetupPlace.of(task_of(calibration), calibration.measured)
+        return cls(before, revision.directions, revision.covariance, revision.carried, place)
+
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+        """Covariance (n, m, m)."""
+        if self.carried is None:
+            return self.before.covariance(inputs, jacobian, moved) + self._own_each(jacobian @ self.offsets)
+        return self.each(inputs, jacobian, self.place.among_all(moved))
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m), each of its own."""
+        if self.carried is None:
+            return self.before.each(inputs, jacobian, None) + self._own_each(
+                self._unknown_to(jacobian, setup)
+            )
+        found = np.empty((len(jacobian), *jacobian.shape[1:2] * 2))
+        for first in range(0, len(jacobian), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            own = None if setup is None else setup[some]
+            found[some] = self._carried_each(self.carried, inputs[some], jacobian[some], own)
+        return found
+
+    def _carried_each(
+        self, carried: Carried, inputs: Floats, jacobian: Floats, setup: Floats | None
+    ) -> Floats:
+        """Covariance (n, m, m) of no more than can be asked for at once."""
+        rows, tied = self._unknown_to(jacobian, setup), _tied(carried, jacobian, setup)
+        taken = rows @ carried.response[: rows.shape[2]]
+        parts = jacobian.shape[1] // AXES
+        with_shown = self.before.cross(len(inputs) * parts, *_with_shown(carried, inputs, jacobian, tied))
+        both = taken @ with_shown.reshape(taken.shape).transpose(0, 2, 1)
+        found = self.before.each(inputs, jacobian, tied) - both - both.transpose(0, 2, 1)
+        return found + taken @ self._shown @ taken.transpose(0, 2, 1) + self._own_each(rows)
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) before any measurement."""
+        return self.before.prior(inputs, jacobian)
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m)."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        rows = rows.reshape(-1, size)
+        own = rows @ self._anew[:size, :size] @ rows.T
+        if self.carried is None:
+            return self.before.joint(inputs, jacobian) + np.asarray(own)
+        tied = _tied(self.carried, jacobian, setup)
+        then = self.before.joint(*_with_shown(self.carried, inputs, jacobian, tied))
+        taken, count = rows @ self.carried.response[:size], len(rows)
+        both = then[:count, count:] @ taken.T
+        return np.asarray(then[:count, :count] - both - both.T + taken @ then[count:, count:] @ taken.T + own)
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
+        own = left @ self._anew[:size, :size] @ right.T
+        if self.carried is None:
+            return self.before.cross(first, inputs, jacobian, None) + np.asarray(own)
+        response, parts = self.carried.response[:size], jacobian.shape[1] // AXES
+        tied = _tied(self.carried, jacobian, setup)
+        mine = self.before.cross(first * parts, *_with_shown(self.carried, inputs, jacobian, tied))
+        others = _with_shown(self.carried, inputs[first:], jacobian[first:], tied[first:])
+        theirs = self.before.cross((len(inputs) - first) * parts, *others)
+        between, shown = mine[:, : len(right)], mine[:, len(right) :]
+        taken, taken_there = left @ response, right @ response
+        found = between - shown @ taken_there.T - taken @ theirs.T + taken @ self._shown @ taken_there.T
+        return np.asarray(found + own)
+
+    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
+        rows = jacobian @ self.offsets
+        return rows if setup is None else np.concatenate([rows, setup], axis=2)
+
+    def _own_each(self, rows: Floats) -> Floats:
+        """Covariance (n, m, m) of rows (n, m, u) by the first u unknowns that the update adds of its own."""
+        size = rows.shape[2]
+        return np.asarray(rows @ self._anew[:size, :size] @ rows.transpose(0, 2, 1))
+
+    @property
+    def _anew(self) -> Floats:
+        """Covariance (u + S, u + S) of what was estimated, beside what of the errors before it took up."""
+        return self.of_all if self.carried is None else self.carried.own
+
+    @cached_property
+    def _shown(self) -> Floats:
+        """Covariance (R, R) before the update of what its rows showed."""
+        if self.carried is None:
+            raise WorkError("this update carries nothing", rule="Only what it made of errors before is shown")
+        carried = self.carried
+        return self.before.joint(*_in_threes(carried.inputs, carried.jacobian, carried.setup))
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """As before."""
+        return self.before.noise(jacobian, orientation)
+
+
+def _tied(carried: Carried, jacobian: Floats, setup: Floats | None) -> Floats:
+    """Derivatives (n, m, S') by the set-ups of the calibration before, of those (n, m, S) by the new ones."""
+    return np.zeros((*jacobian.shape[:2], carried.tied.shape[1])) if setup is None else setup @ carried.tied
+
+
+def _with_shown(
+    carried: Carried, inputs: Floats, jacobian: Floats, tied: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Inputs and rows, three at a time, and behind them those of the update."""
+    mine, shown = (inputs, jacobian, tied), (carried.inputs, carried.jacobian, carried.setup)
+    at = np.concatenate([_repeated(*part[:2]) for part in (mine, shown)])
+    of_arm, of_setup = (np.concatenate([_threes(mine[k]), _threes(shown[k])]) for k in (1, 2))
+    return at, of_arm, of_setup
+
+
+def _in_threes(
+    inputs: Floats, jacobian: Floats, setup: Floats | None
+) -> tuple[Floats, Floats, Floats | None]:
+    """Inputs, and rows (n, m, ...) of derivatives, three at a time: m is a multiple of three."""
+    return _repeated(inputs, jacobian), _threes(jacobian), None if setup is None else _threes(setup)
+
+
+def _repeated(inputs: Floats, jacobian: Floats) -> Floats:
+    """Inputs (n, I), once for every three rows (n, m, ...)."""
+    return np.repeat(inputs, jacobian.shape[1] // AXES, axis=0)
+
+
+def _threes(rows: Floats) -> Floats:
+    """Rows (n, m, k) three at a time, (n m / 3, 3, k)."""
+    return np.ascontiguousarray(rows.reshape(-1, AXES, rows.shape[2]))
+
+
+def noises_of(hyper: Mapping[str, Sequence[float]]) -> tuple[float, float]:
+    """Noise of positions in m and of orientations in rad among a field's hyper-parameters."""
+    return hyper["noise_position"][0], hyper["noise_orientation"][0]
+
+
+def task_of(calibration: "Calibration") -> Task:
+    """The task that made a calibration."""
+    return Task(calibration.arm, calibration.selection, calibration.groups, calibration.options)

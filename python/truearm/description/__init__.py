@@ -1,0 +1,1 @@
+"""Descriptions of arms: files of our own, URDF, Denavit-Hartenberg rows from axes."""

@@ -1,0 +1,29 @@
+"""Readings that poses are drawn from: within a robot's limits, one turn of each joint at the most."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.description.robot_data import RobotData
+
+Floats = NDArray[np.float64]
+
+TURN: Final = 2.0 * np.pi
+OPEN_WAY_M: Final = 1.0
+"""Of a joint that slides without limits."""
+
+
+def one_turn(robot: RobotData) -> tuple[Floats, Floats]:
+    """Lowest and highest readings (N,) to draw from.
+
+    A joint that may turn further, or slides without end, gets the part of its limits with the middle nearest
+    to zero: readings a turn apart are taken to err alike, and a joint may have its zero anywhere.
+    """
+    low, high = robot.limits.T
+    turns = np.array([kind == "revolute" for kind in robot.joints])
+    widest = np.where(turns, TURN, np.where(np.isfinite(robot.limits).all(axis=1), np.inf, OPEN_WAY_M))
+    part = np.where(np.isfinite(widest), widest, 0.0)
+    begun = np.minimum(np.maximum(-0.5 * part, low), high - part)
+    wide = high - low > widest
+    return np.where(wide, begun, low), np.where(wide, begun + part, high)

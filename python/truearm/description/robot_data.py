@@ -1,0 +1,98 @@
+"""The fields of a robot: nominal table, fixed transforms, coupling and limits, checked on the way in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.arrays import frozen, rigid
+from truearm.description.urdf_names import UrdfNames
+from truearm.errors import InputError
+
+Convention = Literal["standard", "modified"]
+Joint = Literal["revolute", "prismatic"]
+Floats = NDArray[np.float64]
+
+MIN_COUPLING_DETERMINANT: Final = 1e-9
+TRANSFORMS: Final = ("base", "flange", "tool")
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What the arm carried: mass, and centre of gravity in the flange frame."""
+
+    mass_kg: float
+    centre_of_gravity_mm: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RobotData:
+    """The fields of a Robot, which describes them, checked on the way in."""
+
+    name: str
+    source: str
+    convention: Convention
+    joints: tuple[Joint, ...]
+    table: Floats
+    base: Floats
+    flange: Floats
+    tool: Floats
+    base_row: Floats | None
+    coupling: Floats
+    limits: Floats
+    payload: Payload | None = None
+    urdf_names: UrdfNames | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.joints)
+        _check_known("convention", (self.convention,), get_args(Convention))
+        _check_known("joints", self.joints, get_args(Joint))
+        shapes = {"table": (n, 5), **dict.fromkeys(TRANSFORMS, (4, 4))}
+        shapes |= {"coupling": (n, n), "limits": (n, 2)}
+        for field, shape in shapes.items():
+            value = _checked(field, getattr(self, field), shape)
+            object.__setattr__(self, field, _rigid(field, value) if field in TRANSFORMS else value)
+        if self.base_row is not None:
+            object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
+        unordered = np.flatnonzero(~(self.limits[:, 0] < self.limits[:, 1]))
+        if len(unordered):
+            raise InputError(
+                f"joint {unordered[0] + 1} has {self.limits[unordered[0]].tolist()}",
+                where="limits",
+                rule="The lowest reading comes first, then the highest; infinite where there is none",
+            )
+        if abs(np.linalg.det(self.coupling)) < MIN_COUPLING_DETERMINANT:
+            raise InputError(
+                "the coupling matrix is singular",
+                where="coupling",
+                rule="Every joint value must come from one set of readings only",
+            )
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, N."""
+        return len(self.joints)
+
+
+def _check_known(field: str, values: Sequence[str], known: tuple[str, ...]) -> None:
+    for value in values:
+        if value not in known:
+            raise InputError(f'"{value}" is not known', where=field, rule=f"Either {' or '.join(known)}")
+
+
+def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(f"shape {array.shape}", where=field, rule=f"The shape must be {shape}")
+    if field != "limits" and not np.isfinite(array).all():
+        raise InputError("NaN or infinite value", where=field, rule="All values must be finite")
+    return frozen(array, *shape)
+
+
+def _rigid(field: str, transform: Floats) -> Floats:
+    exact, fault = rigid(transform[None])
+    if fault is not None:
+        raise InputError(f"no rigid motion: {fault.why}", where=field, rule=fault.rule, way_out=fault.way_out)
+    return frozen(exact[0], 4, 4)

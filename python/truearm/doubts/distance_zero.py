@@ -1,0 +1,130 @@
+"""Distances to a fixed point that are all off by one length: the zero of a wire is unknown."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import CoreError, Setup, fit_constant
+from truearm.errors import Notice, count_of
+from truearm.fits.core_set import anchor_names, core_set
+from truearm.fits.fitting import Task, fit_options
+from truearm.fits.models import ArmModel
+from truearm.measurements import Measurements
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+DISTANCE_ZERO: Final = "distance_zero"
+EXPLAINED: Final = 0.7
+"""A length that leaves a smaller part of what is missed is no chance."""
+SURE: Final = 5.0
+"""Standard errors that such a length has to be."""
+UNKNOWNS: Final = 7
+"""Where the fixed point and the target are, and the length."""
+FIRST_M: Final = 1e-3
+"""First length that is tried, one way or the other."""
+ENOUGH_M: Final = 1e-6
+MOST_STEPS: Final = 30
+FEWEST: Final = 3 * UNKNOWNS
+"""Distances to one fixed point, at the least."""
+
+
+@dataclass(frozen=True)
+class Zero:
+    """How much longer distances to a fixed point are than they can be.
+
+    Attributes:
+        length_m: By how much.
+        std_m: Standard error of that.
+        before_m: What is missed as they are, root mean square.
+        after_m: What is missed once that is subtracted.
+    """
+
+    length_m: float
+    std_m: float
+    before_m: float
+    after_m: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether distances with this length taken out surely fit the arm better."""
+        return self.after_m < EXPLAINED * self.before_m and abs(self.length_m) > SURE * self.std_m
+
+
+def zero_notices(task: Task, data: Measurements, models: Sequence[ArmModel]) -> list[Notice]:
+    """Warnings where distances to one anchor fit the arm once one length is subtracted.
+
+    Constants may have taken a part of that length over: it is told by that of the models it fits best.
+    """
+    if data.anchor is None or data.distance_m is None or not task.selection.distances:
+        return []
+    found = []
+    for number, anchor in enumerate(anchor_names(data)):
+        for index, group in enumerate(task.groups):
+            rows = data.select((data.anchor == anchor) & (data.group == group) & np.isfinite(data.distance_m))
+            if len(rows) >= FEWEST:
+                zeros = (_zero(task, rows, model, (index, number)) for model in models)
+                known = (zero for zero in zeros if zero is not None)
+                zero = min(known, key=lambda each: each.after_m, default=None)
+                found += [_notice(anchor, zero, len(rows))] if zero is not None and zero.is_sure else []
+    return found
+
+
+def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int]) -> Zero | None:
+    """That of rows of one set-up, by its number, with distances to one anchor, by its number.
+
+    Residuals add up to nothing where the length is right: with the fixed point and the target found anew for
+    each length, their sum is half of what the sum of squares falls by it. The secant method finds it. All
+    rows count alike, whatever their sigma.
+
+    Returns:
+        None where no length that is shorter than all distances does.
+    """
+    group, anchor = place
+    own, setup = replace(task, groups=rows.groups), model.setup
+    options = fit_options(task.threads, parameters=model.constants)
+    frame, targets, turned = (part[[group]] for part in (setup.frames, setup.targets, setup.rotations))
+    options["start"] = Setup(frame, targets, turned, setup.anchors[[anchor]])
+
+    def left(length_m: float) -> Floats:
+        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m, sigma_m=None)
+        problem = own.problem(core_set(own.arm.robot, shorter, own.selection, own.groups), [])
+        fit = fit_constant(problem, options)
+        options["start"] = fit.setup
+        return fit.residuals
+
+    shortest = float(np.asarray(rows.distance_m).min())
+    try:
+        without = left(0.0)
+        now, length, step = without, 0.0, float(np.copysign(FIRST_M, without.sum()))
+        for _ in range(MOST_STEPS):
+            step = min(step, 0.5 * (shortest - length))
+            length, before, now = length + step, now, left(length + step)
+            counted = float(before.sum() - now.sum()) / step if step else 0.0
+            # Far from where it is right the sum hardly changes: on in larger steps.
+            step = float(now.sum()) / counted if counted > 0.0 else 2.0 * step
+            if counted > 0.0 and abs(step) < ENOUGH_M:
+                break
+        else:
+            return None
+    except CoreError:
+        return None
+    before_m, after_m = (float(np.sqrt(np.square(each).mean())) for each in (without, now))
+    noise = after_m * np.sqrt(len(rows) / (len(rows) - UNKNOWNS))
+    return Zero(length, float(noise / np.sqrt(counted)), before_m, after_m)
+
+
+def _notice(anchor: str, zero: Zero, count: int) -> Notice:
+    before, after, std = (MM_PER_METRE * each for each in (zero.before_m, zero.after_m, zero.std_m))
+    length = f"{MM_PER_METRE * abs(zero.length_m):.4g} mm"
+    too, how = ("long", f"Subtract {length} from") if zero.length_m > 0.0 else ("short", f"Add {length} to")
+    text = (
+        f'The {count_of(count, "distance")} to "{anchor}" seem to be {length} too {too}, give or take '
+        f"{std:.2g} mm: without that they miss the arm by {after:.3g} mm in place of {before:.3g} mm, root "
+        "mean square. A wire has to be counted from the point that it leads to, not from where it was "
+        f"switched on. {how} these distances and calibrate again."
+    )
+    return Notice(DISTANCE_ZERO, text)

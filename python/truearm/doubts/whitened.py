@@ -1,0 +1,170 @@
+"""What a model leaves of the poses that it was fitted to, against what it expects there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import setup_jacobian
+from truearm.calibration import Calibration
+from truearm.certainty.uncertainty import task_of
+from truearm.doubts.nominal_misfit import some_rows
+from truearm.fits.core_set import Selection, core_set
+from truearm.fits.enough_values import setup_unknowns
+from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.measured_parts import held_parts
+from truearm.judgement.judging import model_inputs
+from truearm.measurements import Measurements
+from truearm.rows.visits import means, visit_numbers
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+AXES: Final = 3
+MOST_VALUES: Final = 900
+"""Coordinates at the most that are looked at: they tell enough, and their covariance is quick."""
+TRUSTED: Final = 0.5
+"""Rows of a lesser weight are outliers."""
+FAINT: Final = 0.01
+"""Part of a column that is left beside what was fitted, below which that imitates it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """Residuals of v visits to poses, and what the fit has taken of them.
+
+    Residuals r of a fit with noise of covariance R, whose predictions have the posterior covariance S at the
+    rows, have the covariance R - S. They are looked at as z = R^(-1/2) r, with the covariance I - T.
+
+    Attributes:
+        rows: Place of the first row of each visit among the fitted rows (v,), set-up after set-up, each in
+            the order of measuring.
+        left: z, of positions (v, m), three for each target; zero where not measured.
+        held: What was measured (v, m).
+        root: R^(-1/2) of each visit (v, m, m).
+        taken: T (v m, v m).
+        joints: Derivatives (v, m, N) by the joint values, base frame; zero where not measured.
+    """
+
+    rows: Rows
+    left: Floats
+    held: Mask
+    root: Floats
+    taken: Floats
+    joints: Floats
+
+    @classmethod
+    def of(cls, found: Calibration, fitted: FittedRows, progress: Floats) -> "Whitened":
+        """Those of a calibration from positions, of rows that it was fitted to.
+
+        Args:
+            found: The calibration, of constants or of what varies.
+            fitted: Its rows, n of them.
+            progress: When each was measured, from 0 for the first of its set-up to 1 for the last (n,).
+        """
+        rows, residual, held = _visits(fitted, found.selection, progress)
+        data = fitted.fitted.select(rows)
+        inputs, arm, setup, joints = _derivatives(found, data, held)
+        sigma = np.zeros(len(data)) if data.sigma_m is None else np.nan_to_num(data.sigma_m)
+        size = held.shape[1]
+        noise = found.spread.noise(arm, np.zeros(size, dtype=np.bool_))
+        noise = noise + np.square(sigma)[:, None, None] * np.eye(size)
+        noise = np.where(held[:, :, None] & held[:, None], noise, np.eye(size))
+        root = np.linalg.cholesky(np.linalg.inv(noise)).transpose(0, 2, 1)
+        known = found.spread.joint(inputs, arm, setup) / _widened(found) ** 2
+        known = known.reshape(len(data), size, len(data), size)
+        known = np.einsum("iab,ibkc->iakc", root, known)
+        taken = np.einsum("iakc,kdc->iakd", known, root).reshape(held.size, held.size)
+        left = np.einsum("iab,ib->ia", root, residual)
+        return cls(rows, left, held, root, taken, joints)
+
+    @property
+    def kept(self) -> Floats:
+        """Variances (v, m) that the residuals are expected to have, in parts of one."""
+        return np.asarray(1.0 - np.diagonal(self.taken).reshape(self.left.shape))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the residuals."""
+        return float(self.kept[self.held].sum())
+
+    def explained(self, columns: Floats) -> tuple[float, Floats]:
+        """How well so many columns (v, m, k) explain what is left, in metres per unit of each.
+
+        It is the score test of generalised least squares: the columns are fitted beside all that was fitted,
+        without its being searched again.
+
+        Returns:
+            How likely chance explains as much, from 0 to 1; and the coefficients (k,).
+        """
+        from scipy.special import betaincc  # noqa: PLC0415 - slow to import
+
+        whitened = np.einsum("iab,ibk->iak", self.root, columns).reshape(self.left.size, -1)
+        size = np.linalg.norm(whitened, axis=0)
+        whitened /= np.where(size > 0.0, size, 1.0)
+        known, directions = np.linalg.eigh(whitened.T @ whitened - whitened.T @ self.taken @ whitened)
+        directions, known = directions[:, known > FAINT], known[known > FAINT]
+        score = directions.T @ (whitened.T @ self.left.ravel())
+        share = float((np.square(score) / known).sum() / np.square(self.left).sum())
+        found = directions @ (score / known) / np.where(size > 0.0, size, 1.0)
+        rank, free = len(known), self.freedom - len(known)
+        if rank == 0 or free <= rank:
+            return 1.0, found
+        return float(betaincc(0.5 * rank, 0.5 * free, min(share, 1.0))), found
+
+
+def _widened(found: Calibration) -> float:
+    """Factor on standard deviations that is meant for where nothing was measured."""
+    return 1.0 if found.variable is None else found.variable.hyper["extrapolation"][0]
+
+
+def _visits(fitted: FittedRows, selection: Selection, progress: Floats) -> tuple[Rows, Floats, Mask]:
+    """First rows (v,) of visits, the mean residual of each one's shots (v, m), and what they hold (v, m)."""
+    parts = held_parts(fitted.data, selection)[:, :-1]
+    _, group = np.unique(fitted.data.group, return_inverse=True)
+    order = np.lexsort((progress, group.reshape(-1)))
+    counts: Mask = np.asarray((fitted.weight >= TRUSTED) & parts.any(axis=1))
+    order = order[counts[order]]
+    visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
+    held = np.repeat(parts, AXES, axis=1)[order].astype(np.float64)
+    share = means(held, visits)
+    residual = means(fitted.residual[order, : held.shape[1]] * held, visits)
+    residual = np.divide(residual, share, out=np.zeros_like(residual), where=share > 0.0)
+    _, first = np.unique(visits, return_index=True)
+    some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
+    return order[first[some]], residual[some], share[some] > 0.0
+
+
+def _derivatives(found: Calibration, data: Measurements, held: Mask) -> tuple[Floats, Floats, Floats, Floats]:
+    """Inputs (v, I) of rows, and derivatives of what they hold (v, m, ...) by the arm's parameters, by the
+    unknowns of all set-ups, and by the joint values.
+    """
+    task, setup = task_of(found), found.model.setup
+    inputs = model_inputs(task.arm, data, task.options.features)
+    parameters = np.ascontiguousarray(found.model.parameters(inputs))
+    joints = np.ascontiguousarray(inputs[:, : task.arm.robot.joint_count])
+    problem = task.problem(core_set(task.arm.robot, data, task.selection, task.groups), [])
+    own = setup_jacobian(problem, parameters, setup)[:, : held.shape[1]]
+    by_setup = np.zeros((*held.shape, setup_unknowns(task)))
+    by_arm = np.zeros((*held.shape, task.arm.table.size))
+    width = own.shape[2]
+    for number, group in enumerate(task.groups):
+        rows = np.flatnonzero(data.group == group)
+        by_setup[rows, :, number * width : (number + 1) * width] = own[rows]
+        for target, point in enumerate(setup.targets[number]):
+            end = np.eye(4)
+            end[:AXES, AXES] = point
+            chain = task.arm.chain(task.arm.robot.flange @ end)
+            places = np.arange(AXES * target, AXES * (target + 1))
+            by_arm[np.ix_(rows, places)] = chain.parameter_jacobian(joints[rows], parameters[rows])
+    by_arm, by_setup = (np.where(held[:, :, None], part, 0.0) for part in (by_arm, by_setup))
+    return inputs, by_arm, by_setup, by_arm[:, :, _joint_columns(task.arm.joints)]
+
+
+def _joint_columns(joints: Sequence[str]) -> list[int]:
+    """Columns of the parameters, five a link, that joints of these kinds move."""
+    kinds = {"revolute": 0, "prismatic": 1}
+    return [5 * link + kinds[joint] for link, joint in enumerate(joints) if joint in kinds]

@@ -1,0 +1,76 @@
+"""The arm as it is identified: its links, and in front of them its base where that is to be corrected too."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Chain
+from truearm.fits.parameters import PARALLEL_WITHIN_DEG, Candidates, candidates
+from truearm.kinds import required
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+Frame = Literal["free", "world"]
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedArm:
+    """A robot and what of it is an unknown.
+
+    With `frame` "free" the robot's base is fixed and each set-up has a world_from_base of its own. With
+    "world" there is none: the base is a Denavit-Hartenberg row of its own, row 0, before the links.
+
+    Attributes:
+        robot: The nominal arm.
+        frame: "free" or "world".
+        parallel_within_deg: Angle between axes up to which they count as parallel.
+    """
+
+    robot: Robot
+    frame: Frame = "free"
+    parallel_within_deg: float = PARALLEL_WITHIN_DEG
+
+    def __post_init__(self) -> None:
+        required(self.robot, Robot, "the robot")
+
+    @property
+    def world_is_known(self) -> bool:
+        """Whether there is no world_from_base."""
+        return self.frame == "world"
+
+    @property
+    def joints(self) -> list[str]:
+        """Kind of each of the L rows."""
+        return ["fixed", *self.robot.joints] if self.world_is_known else list(self.robot.joints)
+
+    @cached_property
+    def table(self) -> Floats:
+        """Nominal parameters (L, 5)."""
+        if not self.world_is_known:
+            return self.robot.table
+        row = np.zeros(5) if self.robot.base_row is None else self.robot.base_row
+        return np.vstack([row, self.robot.table])
+
+    @property
+    def links(self) -> slice:
+        """The rows that are links: all, or all but the base."""
+        return slice(1 if self.world_is_known else 0, None)
+
+    @cached_property
+    def flange_chain(self) -> Chain:
+        """The compiled chain from base to flange."""
+        return self.chain(self.robot.flange)
+
+    def chain(self, end: Floats) -> Chain:
+        """The compiled chain that ends with the transform `end` (4, 4) after the last link."""
+        base_is_row = self.world_is_known and self.robot.base_row is not None
+        base = np.eye(4) if base_is_row else self.robot.base
+        return Chain(self.robot.convention, self.joints, self.table, base, np.ascontiguousarray(end))
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """The parameters that are asked for."""
+        return candidates(self.robot.convention, self.joints, self.table, self.parallel_within_deg)

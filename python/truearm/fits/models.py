@@ -1,0 +1,46 @@
+"""The models of an arm that are compared: nominal, constant, and one that varies."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Field, Setup
+from truearm.fits.schemes import Scheme, add_ceps
+
+Floats = NDArray[np.float64]
+
+NOMINAL: Final = "nominal"
+CONSTANT: Final = "constant"
+VARIABLE: Final = "variable"
+
+
+def leaves_noise(name: str) -> bool:
+    """Whether what a model leaves is noise: what others leave holds what varies with the joints, too."""
+    return name == VARIABLE
+
+
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """Parameters of the arm, with the set-ups that were fitted together with them.
+
+    Attributes:
+        constants: Absolute parameters (L, 5): rows of the identified chain; theta, d, a, alpha, beta.
+        setup: Frames, targets and anchors of all set-ups.
+        field: What is added to the constants, depending on the inputs; None where nothing is.
+        scheme: One of the paper's schemes in place of a field; None where it is none.
+    """
+
+    constants: Floats
+    setup: Setup
+    field: Field | None = None
+    scheme: Scheme | None = None
+
+    def parameters(self, inputs: Floats) -> Floats:
+        """Absolute parameters at inputs (n, I), joint values and features: (n, L, 5)."""
+        if self.scheme is not None:
+            return add_ceps(self.constants, self.scheme.columns, self.scheme.ceps_at(inputs))
+        if self.field is None:
+            return np.repeat(self.constants[None], len(inputs), axis=0)
+        return self.field.parameters(np.ascontiguousarray(inputs), self.constants)

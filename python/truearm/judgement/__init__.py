@@ -1,0 +1,1 @@
+"""Errors on rows that took no part in a fit."""

@@ -1,0 +1,1 @@
+"""How a calibration is kept in a file, and summed up."""

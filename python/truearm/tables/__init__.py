@@ -1,0 +1,1 @@
+"""What people write into tables, and how it is read."""
