@@ -45,7 +45,7 @@ PAGES = [
 ]
 FENCE = re.compile(r"^( *)```(\w+) run\n(.*?)^\1```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-TRAINING_POSES, OTHER_POSES = 80, 30
+TRAINING_POSES, OTHER_POSES = 60, 30
 
 
 def name_of(page):

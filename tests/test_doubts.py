@@ -379,7 +379,7 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
     table = arm.measure_table(arm.poses(60))
     found = []
-    for row in range(0, 60, 6):
+    for row in range(0, 60, 12):
         wrong = table.assign(x=table["x"] + np.where(table.index == row, 0.9, 0.0))
         calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(wrong), model="constant")
         assert calibration.held is not None
