@@ -24,8 +24,10 @@ use crate::setup::Setup;
 const INDEPENDENT_SHARE: f64 = 1e-6;
 /// A column shorter than this share of the longest one holds nothing but rounding.
 const ROUNDING: f64 = 1e-10;
-/// Poses whose rows are looked at together: of more, triangular factors take the place of rows.
-const POSES: usize = 1000;
+/// Rows that are looked at together: of more, triangular factors take the place of rows.
+const ROWS: usize = 3000;
+/// Rows a column, of which a triangular factor takes the place.
+const TALL: usize = 4;
 /// Parts of a combination below this are left out.
 const NOTEWORTHY: f64 = 0.02;
 
@@ -87,9 +89,12 @@ fn scale(problem: &Problem, layout: &Layout, column: usize) -> f64 {
 /// Scaled columns, set-up first, of all poses; of many the triangular factor, whose columns have the same products.
 fn folded_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64> {
     let poses: Vec<usize> = (0..problem.measurements.pose_count()).collect();
-    let mut parts = poses.chunks(POSES).map(|some| dense_rows(problem, layout, rows, some));
-    let first = parts.next().unwrap_or_else(|| Mat::zeros(0, layout.len()));
-    parts.fold(first, |above, below| Orthogonal::new(concat![[above], [below]]).upper())
+    let parts = poses.chunks((ROWS / rows.rows).max(1)).map(|some| dense_rows(problem, layout, rows, some));
+    let none = Mat::zeros(0, layout.len());
+    parts.fold(none, |above, below| {
+        let both = concat![[above], [below]];
+        if both.nrows() > TALL * both.ncols() { Orthogonal::new(both).upper() } else { both }
+    })
 }
 
 /// Scaled columns, set-up first: rows of some poses, in mm (orientation rows at 300 mm).

@@ -207,6 +207,9 @@ impl Grid {
 }
 
 impl Active {
+    /// No cell at all.
+    pub const NONE: Self = Self { cell: [0; MOST_ACTIVE], grade: [0.0; MOST_ACTIVE] };
+
     /// Excited cells with their grades.
     #[inline]
     pub fn nonzero(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
@@ -260,8 +263,22 @@ impl CellKernel {
         b.nonzero().map(|(j, grade)| grade * self.with_cell(a, j)).sum()
     }
 
+    /// Kernels between a value and others, given the cells that each excites.
+    pub fn kernels<'a>(
+        &self,
+        here: &'a Active,
+        others: impl ExactSizeIterator<Item = &'a Active>,
+    ) -> impl Iterator<Item = f64> {
+        // What all cells have in common with the value is worth knowing where the others look at most of them.
+        let line = (others.len() * MOST_ACTIVE > self.axis.count).then(|| self.line(here));
+        others.map(move |other| match &line {
+            Some(line) => other.weigh(line),
+            None => self.implied(here, other),
+        })
+    }
+
     /// Kernel between a value, given the cells that it excites, and each cell, (count,).
-    pub fn line(&self, a: &Active) -> Vec<f64> {
+    fn line(&self, a: &Active) -> Vec<f64> {
         (0..self.axis.count).map(|j| self.with_cell(a, j)).collect()
     }
 

@@ -20,6 +20,8 @@ use crate::projection::{Projection, setup_columns};
 
 /// Poses whose covariances are found together.
 const BATCH: usize = 64;
+/// Rows of a configuration whose covariances with a training row are summed together.
+const SIDE_BY_SIDE: usize = 4;
 
 /// The rows' covariance, factored.
 pub struct DataSpace {
@@ -207,10 +209,10 @@ impl DataSpace {
 
     fn batch_covariance(&self, query: &Query, poses: Range<usize>, out: &mut [f64]) {
         let rows = query.rows;
-        let (learned, lost) = self.reduced(query, poses.clone());
+        let excited = self.excite(query, poses.clone());
+        let (learned, lost) = self.reduced(query, poses.clone(), &excited);
         for (index, pose) in poses.enumerate() {
-            let excited = self.model.cells.excite(query.values_of(pose));
-            let priors = self.model.variances(&excited);
+            let priors = self.model.variances(&excited[index]);
             let out = &mut out[index * rows * rows..(index + 1) * rows * rows];
             for i in 0..rows {
                 for j in 0..=i {
@@ -227,9 +229,8 @@ impl DataSpace {
 
     /// Covariance (k m, l m) of the rows of some configurations of a query with those of some others, or of the same.
     pub fn joint(&self, query: &Query, left: Range<usize>, right: Range<usize>) -> Mat<f64> {
-        let (learned, lost) = self.reduced(query, 0..query.poses());
-        let excited: Vec<Excited> =
-            (0..query.poses()).map(|pose| self.model.cells.excite(query.values_of(pose))).collect();
+        let excited = self.excite(query, 0..query.poses());
+        let (learned, lost) = self.reduced(query, 0..query.poses(), &excited);
         let mut joint = product(query.part(&learned, &left).transpose(), query.part(&learned, &right))
             * faer::Scale(-1.0);
         joint += product(query.part(&lost, &left).transpose(), query.part(&lost, &right));
@@ -258,15 +259,19 @@ impl DataSpace {
         prior - product(learned.transpose(), learned.as_ref()) + product(lost.transpose(), lost.as_ref())
     }
 
-    /// What the rows of some configurations have in common with the training rows (R, k), and with the set-up's
-    /// unknowns (s, k): learned^T learned is taken from their prior covariance, lost^T lost added to it.
-    fn reduced(&self, query: &Query, poses: Range<usize>) -> (Mat<f64>, Mat<f64>) {
+    /// The cells that some configurations of a query excite.
+    fn excite(&self, query: &Query, poses: Range<usize>) -> Vec<Excited> {
+        poses.map(|pose| self.model.cells.excite(query.values_of(pose))).collect()
+    }
+
+    /// What the rows of some configurations, which excite these cells, have in common with the training rows (R, k), and
+    /// with the set-up's unknowns (s, k): learned^T learned is taken from their prior covariance, lost^T lost added to it.
+    fn reduced(&self, query: &Query, poses: Range<usize>, excited: &[Excited]) -> (Mat<f64>, Mat<f64>) {
         let training = &self.model.training;
         let (rows, width) = (query.rows, training.setup_width);
         let mut cross = Mat::zeros(training.row_count(), poses.len() * rows);
-        for (index, pose) in poses.clone().enumerate() {
-            let excited = self.model.cells.excite(query.values_of(pose));
-            self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
+        for (index, (pose, excited)) in poses.clone().zip(excited).enumerate() {
+            self.cross(excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
         }
         let setup = query.setup.map(|setup| &setup[poses.start * rows * width..poses.end * rows * width]);
         self.solved(cross, setup)
@@ -291,19 +296,25 @@ impl DataSpace {
         let training = &self.model.training;
         let columns = training.columns.len();
         let count = rows.len() / columns;
-        // Column by column, so that the sums of all rows go on side by side.
-        let own: Vec<f64> = (0..rows.len()).map(|k| rows[k % count * columns + k / count]).collect();
-        let mut sums = vec![0.0; count];
+        // Column by column, so that the sums of some rows go on side by side.
+        let own = |first: usize| -> Vec<[f64; SIDE_BY_SIDE]> {
+            let entry = |p: usize, k: usize| if k < count { rows[k * columns + p] } else { 0.0 };
+            (0..columns).map(|p| std::array::from_fn(|k| entry(p, first + k))).collect()
+        };
+        let own: Vec<_> = (0..count).step_by(SIDE_BY_SIDE).map(own).collect();
         let covariances = self.model.covariances(excited, &self.excited);
         for (pose, variances) in covariances.chunks_exact(columns).enumerate() {
             for row in training.rows(pose) {
-                sums.fill(0.0);
-                let entries = training.jacobian_row(row).iter().zip(variances);
-                for ((entry, variance), own) in entries.zip(own.chunks_exact(count)) {
-                    let weight = entry * variance;
-                    sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += weight * own);
+                for (part, own) in own.iter().enumerate() {
+                    let mut sums = [0.0; SIDE_BY_SIDE];
+                    let entries = training.jacobian_row(row).iter().zip(variances);
+                    for ((entry, variance), own) in entries.zip(own) {
+                        let weight = entry * variance;
+                        sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += weight * own);
+                    }
+                    let first = part * SIDE_BY_SIDE;
+                    (first..count.min(first + SIDE_BY_SIDE)).for_each(|k| out[(row, k)] = sums[k - first]);
                 }
-                sums.iter().enumerate().for_each(|(k, &sum)| out[(row, k)] = sum);
             }
         }
     }

@@ -90,43 +90,49 @@ impl Cells {
         table.clear(self.own.len(), self.products.len(), self.waves.len(), others.len());
         for (k, column) in table.own.iter_mut().enumerate() {
             if let (Some(cells), Some(active)) = (&self.own[k], &here.own[k]) {
-                let line = cells.line(active);
-                let values = others.iter().map(|other| other.own[k].as_ref().map_or(0.0, |a| a.weigh(&line)));
+                let values = cells.kernels(
+                    active,
+                    others.iter().map(|other| other.own[k].as_ref().unwrap_or(&Active::NONE)),
+                );
                 column.iter_mut().zip(values).for_each(|(out, value)| *out = value);
             }
         }
         for (k, (cells, active)) in self.smooth.iter().zip(&here.smooth).enumerate() {
-            let line = cells.line(active);
-            let values = others.iter().map(|other| other.smooth[k].weigh(&line));
+            let values = cells.kernels(active, others.iter().map(|other| &other.smooth[k]));
             table.smooth.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         }
         for (index, (column, axes)) in table.products.iter_mut().zip(&self.products).enumerate() {
             column.fill(1.0);
             for (k, (_, cells)) in axes.iter().enumerate() {
-                let line = cells.line(&here.products[index][k]);
-                let values = others.iter().map(|other| other.products[index][k].weigh(&line));
+                let values = cells
+                    .kernels(&here.products[index][k], others.iter().map(|other| &other.products[index][k]));
                 column.iter_mut().zip(values).for_each(|(product, value)| *product *= value);
             }
         }
         for (index, (column, (_, cells))) in table.waves.iter_mut().zip(&self.waves).enumerate() {
-            let line = cells.line(&here.waves[index]);
-            let values = others.iter().map(|other| other.waves[index].weigh(&line));
+            let values = cells.kernels(&here.waves[index], others.iter().map(|other| &other.waves[index]));
             column.iter_mut().zip(values).for_each(|(out, value)| *out = value);
         }
+        let mut loads = vec![0.0; self.own.len()];
         for (i, other) in others.iter().enumerate() {
-            self.fill_loads(&here.levers, &other.levers, table, i);
+            self.fill_loads((&here.levers, &other.levers), &mut loads, table, i);
         }
     }
 
-    /// How alike the loads of the joints are under two sets of levers.
-    fn fill_loads(&self, here: &[f64], there: &[f64], table: &mut PairTable, at: usize) {
-        let mut loads = vec![0.0; self.own.len()];
-        alike(self.geometry.joint_count(), here, there, &mut loads);
-        table.sag.iter_mut().zip(&loads).for_each(|(column, load)| column[at] = *load);
+    /// How alike the loads of the joints are under two sets of levers; `loads` is room for them, one an input.
+    fn fill_loads(
+        &self,
+        (here, there): (&[f64], &[f64]),
+        loads: &mut [f64],
+        table: &mut PairTable,
+        at: usize,
+    ) {
+        alike(self.geometry.joint_count(), here, there, loads);
+        table.sag.iter_mut().zip(loads.iter()).for_each(|(column, load)| column[at] = *load);
     }
 
-    /// Prior variances of the blocks at one configuration, cells beyond the axes included.
-    fn unbounded(&self, values: &[f64]) -> PairTable {
+    /// Prior variances of the blocks at one configuration, which excites these cells, cells beyond the axes included.
+    fn unbounded(&self, values: &[f64], excited: &Excited) -> PairTable {
         let mut table = PairTable::default();
         table.clear(self.own.len(), self.products.len(), self.waves.len(), 1);
         for (k, (column, cells)) in table.own.iter_mut().zip(&self.own).enumerate() {
@@ -139,8 +145,8 @@ impl Cells {
         for (column, (k, cells)) in table.waves.iter_mut().zip(&self.waves) {
             column[0] = cells.variance(values[*k]);
         }
-        let levers = self.geometry.at(values);
-        self.fill_loads(&levers, &levers, &mut table, 0);
+        let levers = &excited.levers;
+        self.fill_loads((levers, levers), &mut vec![0.0; self.own.len()], &mut table, 0);
         table
     }
 }
@@ -282,9 +288,17 @@ impl Model {
     ///
     /// No row excites the cells that would be there: their share of the posterior variance is the prior's.
     pub fn beyond(&self, values: &[f64]) -> Vec<f64> {
+        let [_, beyond] = self.held_and_beyond(values);
+        beyond
+    }
+
+    /// Each column's prior variance at a configuration, (P,): what its cells hold, and what they leave out.
+    pub fn held_and_beyond(&self, values: &[f64]) -> [Vec<f64>; 2] {
         let excited = self.cells.excite(values);
-        let whole = self.combined(&self.cells.unbounded(values), 1);
-        whole.iter().zip(self.variances(&excited)).map(|(all, held)| (all - held).max(0.0)).collect()
+        let held = self.variances(&excited);
+        let whole = self.combined(&self.cells.unbounded(values, &excited), 1);
+        let beyond = whole.iter().zip(&held).map(|(all, held)| (all - held).max(0.0)).collect();
+        [held, beyond]
     }
 
     /// Prior covariances of each column's CEP, (count, P).

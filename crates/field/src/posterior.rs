@@ -339,9 +339,7 @@ impl Posterior {
         let scale = model.hyper.extrapolation.powi(2);
         let mut out = vec![0.0; query.poses() * rows];
         out.par_chunks_exact_mut(rows).enumerate().for_each(|(pose, out)| {
-            let excited = model.cells.excite(query.values_of(pose));
-            let mut variances = model.variances(&excited);
-            let beyond = model.beyond(query.values_of(pose));
+            let [mut variances, beyond] = model.held_and_beyond(query.values_of(pose));
             variances.iter_mut().zip(beyond).for_each(|(variance, more)| *variance += more);
             let own = (0..rows).map(|i| scale * query.prior(pose, (i, i), &variances));
             out.iter_mut().zip(own).for_each(|(out, variance)| *out = variance);
