@@ -1,9 +1,7 @@
 //! What can be measured and of which arm: groups, targets, poses, gaps, features, other chains.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{
+use crate::common::{
     Arm, Measure, Truth, deviations, fit, fit_from, options, root_mean_square, scara, seven_axes, six_axes,
 };
 use truearm_estimate::MeasurementSet;

@@ -1,9 +1,7 @@
 //! Choice of poses: the criteria, the exchange against all subsets, and what is refused.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::stream::Stream;
+use crate::common::stream::Stream;
 use truearm_estimate::{
     Cancel, Choice, ChoiceOptions, Criterion, EstimateError, Observability, choose_poses, observability_of,
 };
@@ -127,7 +125,7 @@ fn indices_of_a_diagonal_matrix_are_known() {
     let found = observability_of(&jacobian, 3, &[1, 2, 3]).unwrap();
     let expected = [3.0, 6.0_f64.cbrt(), 1.0 / 3.0, 1.0, 1.0 / 3.0, 6.0 / 11.0, 2.0 * 6.0_f64.ln()];
     let got = [found.kappa, found.o1, found.o2, found.o3, found.o4, found.o5, found.log_determinant];
-    common::assert_close(&got, &expected, 1e-12);
+    crate::common::assert_close(&got, &expected, 1e-12);
 }
 
 #[test]

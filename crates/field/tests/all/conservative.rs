@@ -1,9 +1,7 @@
 //! The conservative standard deviation against exact values it has never seen.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::Random;
+use crate::common::Random;
 use truearm_estimate::{Cancel, EstimateError};
 use truearm_field::{
     Conservative, ConservativePlan, FACTOR_COLUMNS, FieldError, InputKind, Leverage, MOVED, Samples,

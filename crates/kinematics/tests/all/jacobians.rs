@@ -1,9 +1,7 @@
 //! Every Jacobian against finite differences of the textbook reference.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{assert_close, differences, mixed, reference, six_axis, spread};
+use crate::common::{assert_close, differences, mixed, reference, six_axis, spread};
 use truearm_kinematics::{Chain, Convention, Parameters};
 
 /// Error of central differences with a step of 1e-5.

@@ -1,11 +1,9 @@
 //! Arms that cannot leave a plane, whose real axes are off parallel by a little.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::f64::consts::FRAC_PI_2;
 
-use common::{Scene, chain, correct, readings, unbounded};
+use crate::common::{Scene, chain, correct, readings, unbounded};
 use truearm_compensate::{Inverse, Limits, Options, Reason, Solved, Task};
 use truearm_kinematics::{Chain, Convention, Joint, Parameters, Transform};
 
@@ -113,7 +111,7 @@ fn readings_are_found_for_poses_beside_the_plane() {
         let meant = scene.meant(&q);
         let poses: Vec<f64> = meant.iter().flat_map(Transform::to_matrix).collect();
         let options = Options { limits: unbounded(), ..Options::default() };
-        let inverse = Inverse::new(scene.calibrated(), &common::tool(), options).unwrap();
+        let inverse = Inverse::new(scene.calibrated(), &crate::common::tool(), options).unwrap();
         let (mut found, mut residuals) = (vec![0.0; q.len()], vec![0.0; 2 * WAYPOINTS]);
         let out = Solved { readings: &mut found, residuals: &mut residuals };
         let refused = inverse.each(&poses, &q, &[], out, &truearm_compensate::Run::default()).unwrap();

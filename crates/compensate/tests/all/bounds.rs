@@ -1,9 +1,7 @@
 //! Every bound refuses with its reason, and near singular configurations no joint jumps.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{Scene, apart, correct, readings, six_axis, tool, unbounded};
+use crate::common::{Scene, apart, correct, readings, six_axis, tool, unbounded};
 use proptest::prelude::*;
 use truearm_compensate::{
     CompensateError, ConstantSpread, Correction, Corrector, Limits, Model, Options, Reason, Spread,

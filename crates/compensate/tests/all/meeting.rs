@@ -1,9 +1,7 @@
 //! After compensation the real tool is where the program means it.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{Scene, apart, correct, readings, seven_axis, six_axis, sliding, unbounded};
+use crate::common::{Scene, apart, correct, readings, seven_axis, six_axis, sliding, unbounded};
 use truearm_compensate::Options;
 
 /// What the calibrated model may be off at corrected readings, m and rad.

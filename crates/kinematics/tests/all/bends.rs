@@ -1,9 +1,7 @@
 //! The second order of the end's way against differences of the textbook reference.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{mixed, reference, six_axis, spread};
+use crate::common::{mixed, reference, six_axis, spread};
 use truearm_kinematics::{
     Bent, Chain, Convention, Isa, Kernel, Lane, LaneFrame, LaneParameters, Screw, SharedParameters,
     Transform, bend, dispatch,

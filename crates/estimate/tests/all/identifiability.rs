@@ -1,12 +1,10 @@
 //! Which parameters the poses determine, and with what the others are confounded.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{
+use crate::common::arms::{
     RV_M2_SPANS, columns, rv_m2, rv_m2_fifteen, ur10, ur10_columns, ur10_determined, ur10_plain_columns,
 };
-use common::scene::{Plan, Scene};
+use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{FrameMode, Identifiability, Layout, identifiability};
 
 fn ask(scene: &Scene) -> Identifiability {

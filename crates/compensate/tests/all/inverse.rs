@@ -1,9 +1,7 @@
 //! Readings for poses, on the branch and turn of the seed.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{Scene, apart, readings, six_axis, stream, tool};
+use crate::common::{Scene, apart, readings, six_axis, stream, tool};
 use truearm_compensate::{Inverse, Options, Reason, Run, Solved};
 use truearm_kinematics::Transform;
 

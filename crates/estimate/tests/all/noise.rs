@@ -1,12 +1,10 @@
 //! With noise: stated covariance, noise estimate, own sigmas.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{rv_m2, rv_m2_fifteen, ur10, ur10_columns, ur10_determined};
-use common::root_mean_square;
-use common::scene::{Plan, Scene};
-use common::stream::Stream;
+use crate::common::arms::{rv_m2, rv_m2_fifteen, ur10, ur10_columns, ur10_determined};
+use crate::common::root_mean_square;
+use crate::common::scene::{Plan, Scene};
+use crate::common::stream::Stream;
 use truearm_estimate::{ConstantFit, ConstantOptions, FrameMode, Noise, Prior, fit_constant};
 
 const SEEDS: std::ops::Range<u64> = 0..60;

@@ -1,11 +1,9 @@
 //! The set-up is found without start values, wherever the arm stands and whatever it holds.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{scara, seven_axis, ur10, ur10_determined};
-use common::root_mean_square;
-use common::scene::{Plan, Scene};
+use crate::common::arms::{scara, seven_axis, ur10, ur10_determined};
+use crate::common::root_mean_square;
+use crate::common::scene::{Plan, Scene};
 use proptest::prelude::*;
 use truearm_estimate::{ConstantOptions, Setup, fit_constant, initial_setup, residuals};
 
@@ -93,9 +91,9 @@ fn planar_points_are_enough_with_an_arm_that_moves_in_a_plane() {
 fn the_start_of_a_perfect_arm_is_already_there() {
     let scene = Plan { errors: 0.0, tool: 0.3, ..Plan::new(ur10(), vec![], 20) }.make();
     let setup = start(&scene);
-    common::assert_close(&setup.groups[0].targets[0], &scene.setup.groups[0].targets[0], 1e-6);
+    crate::common::assert_close(&setup.groups[0].targets[0], &scene.setup.groups[0].targets[0], 1e-6);
     let (got, wanted) = (&setup.groups[0].world_from_base, &scene.setup.groups[0].world_from_base);
-    common::assert_close(&got.rotation, &wanted.rotation, 1e-6);
+    crate::common::assert_close(&got.rotation, &wanted.rotation, 1e-6);
 }
 
 #[test]
@@ -104,6 +102,6 @@ fn anchors_are_found() {
     let scene =
         Plan { errors: 0.0, tool: 0.0, ..Plan::new(ur10(), vec![], 20) }.make().with_distances(&anchors, 0.0);
     for (found, wanted) in start(&scene).anchors.iter().zip(&anchors) {
-        common::assert_close(found, wanted, 1e-6);
+        crate::common::assert_close(found, wanted, 1e-6);
     }
 }

@@ -1,9 +1,7 @@
 //! Gross errors are found and innocent poses are not.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{Measure, Truth, deviations, fit, root_mean_square, scara, six_axes};
+use crate::common::{Measure, Truth, deviations, fit, root_mean_square, scara, six_axes};
 use truearm_field::{FieldFit, Posterior};
 
 /// Files keep these weights: standard deviations are to come out of them as out of the fit.

@@ -1,13 +1,11 @@
 //! Refusals: what is wrong, the rule, and the way out; never a plausible answer.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::f64::consts::FRAC_PI_2;
 
-use common::arms::{ur10, ur10_columns, ur10_determined};
-use common::root_mean_square;
-use common::scene::{Plan, Scene};
+use crate::common::arms::{ur10, ur10_columns, ur10_determined};
+use crate::common::root_mean_square;
+use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{
     Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior,
     Problem, Setup, fit_constant, identifiability, linearise, residuals, setup_precision,

@@ -1,13 +1,11 @@
 //! The same bits whatever the threads, the same numbers whatever the instruction set.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::process::Command;
 
-use common::arms::{all_columns, ur10, ur10_columns};
-use common::assert_close;
-use common::scene::Plan;
+use crate::common::arms::{all_columns, ur10, ur10_columns};
+use crate::common::assert_close;
+use crate::common::scene::Plan;
 use truearm_estimate::{ConstantFit, ConstantOptions, Prior, Robust, fit_constant, identifiability};
 
 fn fit(poses: Vec<usize>, robust: Option<Robust>) -> ConstantFit {

@@ -1,9 +1,7 @@
 //! Fits of arms whose truth is known: error and intervals on poses that took no part.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{
+use crate::common::{
     Arm, Fitted, Measure, Random, Truth, deviations, fit, fit_from, fitted, options, problem,
     root_mean_square, six_axes, subset,
 };

@@ -1,12 +1,10 @@
 //! Analytic derivatives of points and orientations against differences of the residuals.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{all_columns, rv_m2, scara, seven_axis, ur10, with_ends};
-use common::assert_close;
-use common::differences::{dense, differences};
-use common::scene::{Plan, Scene};
+use crate::common::arms::{all_columns, rv_m2, scara, seven_axis, ur10, with_ends};
+use crate::common::assert_close;
+use crate::common::differences::{dense, differences};
+use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{FrameMode, Point, linearise};
 use truearm_kinematics::Chain;
 

@@ -1,13 +1,11 @@
 //! Without noise, the parameters that the data determines come back to rounding.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{
+use crate::common::arms::{
     ALPHA, PLAIN, THETA, columns, rv_m2, rv_m2_fifteen, scara, seven_axis, ur10, ur10_determined,
 };
-use common::scene::{Plan, Scene};
-use common::{assert_close, distance, root_mean_square};
+use crate::common::scene::{Plan, Scene};
+use crate::common::{assert_close, distance, root_mean_square};
 use truearm_estimate::{ConstantFit, ConstantOptions, FrameMode, Prior, Reason, fit_constant};
 
 #[track_caller]

@@ -1,9 +1,7 @@
 //! What a chain refuses, and what it says of itself.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{link, mixed, six_axis};
+use crate::common::{link, mixed, six_axis};
 use truearm_kinematics::{Chain, Convention, InstructionSet, Joint, KinematicsError, Link, Transform};
 
 fn make(links: Vec<Link>, base: Transform) -> Result<Chain, KinematicsError> {
@@ -66,11 +64,11 @@ fn a_lower_instruction_set_is_a_lower_one() {
 #[test]
 fn with_up_heights_are_along_up() {
     for chain in [six_axis(), mixed(Convention::Modified)] {
-        let q = common::spread(chain.joint_count(), 3);
-        let before = common::reference(&chain, &q, &chain.nominal()).translation;
+        let q = crate::common::spread(chain.joint_count(), 3);
+        let before = crate::common::reference(&chain, &q, &chain.nominal()).translation;
         for up in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.4, -0.2, -0.7]] {
             let turned = chain.with_up(up).unwrap();
-            let after = common::reference(&turned, &q, &chain.nominal()).translation;
+            let after = crate::common::reference(&turned, &q, &chain.nominal()).translation;
             let length = up.iter().map(|part| part * part).sum::<f64>().sqrt();
             let height: f64 = up.iter().zip(before).map(|(a, b)| a * b / length).sum();
             assert!((after[2] - height).abs() < 1e-12, "{up:?}: {} is not {height}", after[2]);

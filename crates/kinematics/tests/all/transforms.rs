@@ -1,11 +1,9 @@
 //! Rigid motions: group axioms, and the exponential with its inverse.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{assert_close, mixed};
+use crate::common::{assert_close, mixed};
 use proptest::prelude::*;
 use truearm_kinematics::{Convention, Parameters, Transform, rotation_exp, rotation_log};
 

@@ -1,10 +1,8 @@
 //! What the prior does to what the data leaves open, and what the evidence does to the prior.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{ur10, ur10_columns, ur10_plain_columns, with_parameters};
-use common::scene::{Plan, Scene};
+use crate::common::arms::{ur10, ur10_columns, ur10_plain_columns, with_parameters};
+use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{ConstantFit, ConstantOptions, Noise, Prior, Reason, fit_constant};
 
 fn fit(scene: &Scene, prior: Prior) -> ConstantFit {

@@ -1,11 +1,9 @@
 //! Tasks that ask for less than a pose, arms that have more or fewer joints, readings that are coupled.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{Scene, apart, correct, five_axis, readings, seven_axis, six_axis, unbounded};
+use crate::common::{Scene, apart, correct, five_axis, readings, seven_axis, six_axis, unbounded};
 use truearm_compensate::{Options, Task};
 use truearm_kinematics::Transform;
 
@@ -132,7 +130,7 @@ fn null_direction(scene: &Scene, q: &[f64]) -> Vec<f64> {
     scene.chain.joint_pose_jacobian(q, parameters, &mut jacobian).unwrap();
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let start: Vec<f64> = common::stream(7, 5);
+    let start: Vec<f64> = crate::common::stream(7, 5);
     for candidate in jacobian.chunks_exact(7).chain([&start[..]]) {
         let mut row = candidate.to_vec();
         for _ in 0..2 {

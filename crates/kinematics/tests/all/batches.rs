@@ -1,11 +1,9 @@
 //! Batches: the same bits however the work is divided, the same numbers on every instruction set, lengths refused.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::num::NonZeroUsize;
 
-use common::{assert_close, mixed, six_axis, spread};
+use crate::common::{assert_close, mixed, six_axis, spread};
 use truearm_kinematics::{
     Batch, Chain, Convention, InstructionSet, Isa, Kernel, KinematicsError, LANES, Lane, LaneFrame,
     LaneParameters, Parameters, Screw, SharedParameters, Transform, dispatch_on, lane_room, load_lanes,

@@ -1,9 +1,7 @@
 //! Levers against differences of heights, and one pose alone against the same pose among others.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{mixed, reference, six_axis, spread};
+use crate::common::{mixed, reference, six_axis, spread};
 use truearm_kinematics::{
     BESIDE, Chain, Convention, InstructionSet, Isa, Joint, Kernel, Lane, LaneFrame, LaneParameters,
     LeverScratch, Link, OnePose, Screw, SharedParameters, Transform, dispatch_on, lever_count,

@@ -1,9 +1,7 @@
 //! Evaluation of a bank: one by one, in batches, by many threads, and what a bank must hold.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::{Random, Truth, six_axes, with_threads};
+use crate::common::{Random, Truth, six_axes, with_threads};
 use truearm_field::{Axis, Bank, Block, Compiled, FieldError, Grid, Input, Levers};
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 

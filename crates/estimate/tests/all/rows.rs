@@ -1,12 +1,10 @@
 //! Rows that are gross errors, missing, or switched off.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
-use common::arms::{ur10, ur10_determined};
-use common::assert_close;
-use common::scene::{Plan, Scene};
-use common::stream::Stream;
+use crate::common::arms::{ur10, ur10_determined};
+use crate::common::assert_close;
+use crate::common::scene::{Plan, Scene};
+use crate::common::stream::Stream;
 use truearm_estimate::{ConstantFit, ConstantOptions, MeasurementSet, Prior, Robust, fit_constant};
 
 fn plan() -> Plan {

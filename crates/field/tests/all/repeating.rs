@@ -1,11 +1,9 @@
 //! The same input gives the same bits, a restored posterior the same covariance, a request to stop is obeyed.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-mod common;
-
 use std::time::{Duration, Instant};
 
-use common::{Measure, Truth, fit_from, options, problem, scara, six_axes, with_threads};
+use crate::common::{Measure, Truth, fit_from, options, problem, scara, six_axes, with_threads};
 use truearm_estimate::{Cancel, EstimateError, Point};
 use truearm_field::{FieldError, FieldFit, Hyper, Posterior, restore};
 

@@ -1,0 +1,12 @@
+//! All tests of the crate from outside, in one binary: it is built and linked once.
+#![allow(missing_docs, reason = "tests")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bounds;
+mod inverse;
+mod meeting;
+mod planes;
+mod stream;
+mod tasks;
