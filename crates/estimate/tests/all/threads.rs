@@ -64,7 +64,7 @@ fn prints_its_parameters() {
 fn the_same_numbers_with_every_instruction_set() {
     let with = |level: &str| -> Vec<f64> {
         let output = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "prints_its_parameters", "--ignored", "--nocapture"])
+            .args(["--exact", "threads::prints_its_parameters", "--ignored", "--nocapture"])
             .env("TRUEARM_ISA", level)
             .output()
             .unwrap();
