@@ -380,9 +380,8 @@ def _fitted_spread(
 
 def _measured(task: Task, fits: Fits, left: float) -> MeasuredParts:
     """What the rows of each set-up hold of what was fitted, of which the model leaves so much, m."""
-    fit, sigma = fits.variable or fits.constant, fits.data.sigma_m
-    own = np.zeros(len(fits.data)) if sigma is None else np.nan_to_num(sigma)
-    return MeasuredParts.of(fits.data, task.selection, task.groups, sureness(own, left, fit.weights))
+    sure = sureness(fits.data.stated_sigma_m, left, (fits.variable or fits.constant).weights)
+    return MeasuredParts.of(fits.data, task.selection, task.groups, sure)
 
 
 def _fit_both(

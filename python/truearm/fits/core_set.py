@@ -119,14 +119,13 @@ def core_set(
     """
     count = len(data)
     number = {name: k for k, name in enumerate(groups)}
-    sigma = np.zeros(count) if data.sigma_m is None else np.nan_to_num(data.sigma_m, nan=0.0)
     return MeasurementSet(
         {
             "joints": robot.joints_from_readings(data.readings),
             "group": np.array([number[name] for name in data.group], dtype=np.int64),
             "targets": np.ascontiguousarray(data.targets[:, list(selection.targets)]),
             "rotations": rotations(data) if selection.orientation else None,
-            "sigma": sigma,
+            "sigma": data.stated_sigma_m,
             "weight": np.ones(count) if weight is None else weight,
             "distances": _distances(data) if selection.distances else [],
         }

@@ -161,9 +161,8 @@ class Fits:
 def constant_variances(fits: Fits, selection: Selection) -> Floats:
     """Variances (n, m) that the constant fit took for what its rows hold, those of distances (n, 1)."""
     position, orientation = fits.constant.noise
-    own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
     width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
-    variance = np.repeat((position**2 + own**2)[:, None], width, axis=1)
+    variance = np.repeat((position**2 + fits.data.stated_sigma_m**2)[:, None], width, axis=1)
     if selection.orientation:
         variance[:, -3:] = orientation**2
     return variance
