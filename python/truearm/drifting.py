@@ -205,7 +205,7 @@ def _residuals_in_world(task: Task, fit: FieldFit, data: Measurements) -> tuple[
     adds to the noise that all have.
     """
     count = len(task.selection.targets)
-    seen = np.asarray(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2))
+    seen = data.seen(task.selection.targets)
     left = fit.residuals[:, : 3 * count].reshape(-1, count, 3)
     mean = (left * seen[:, :, None]).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
     noise = unexplained(task, fit, data)

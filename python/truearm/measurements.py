@@ -23,16 +23,7 @@ from truearm.tables.same_tables import identities, told_apart
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
-CONTENT: Final = (
-    "readings",
-    "targets",
-    "orientations",
-    "sigma_m",
-    "group",
-    "distance_m",
-    "anchor",
-    "pair",
-)
+CONTENT: Final = ("readings", "targets", "orientations", "sigma_m", "group", "distance_m", "anchor", "pair")
 PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")
 NUMBERS: Final = {
     "readings": ("N",),
@@ -166,6 +157,13 @@ class Measurements:
     def stated_sigma_m(self) -> Floats:
         """What each row states as its standard deviation (n,), zero where it states none."""
         return np.zeros(len(self)) if self.sigma_m is None else np.nan_to_num(self.sigma_m)
+
+    @property
+    def oriented(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the rows that hold an orientation."""
+        if self.orientations is None:
+            return np.zeros(len(self), dtype=np.bool_)
+        return np.asarray(np.isfinite(self.orientations).all(axis=1))
 
     @classmethod
     def read_csv(
@@ -357,10 +355,15 @@ class Measurements:
             digest.update(np.ascontiguousarray(self.features[column], dtype=np.float64).tobytes())
         return digest.hexdigest()
 
+    def seen(self, targets: int | Sequence[int] | None = None) -> NDArray[np.bool_]:
+        """Which points each row holds: (n, T), (n, t) of `targets`, indices from 0, or (n,) of one target."""
+        points = self.targets if targets is None else self.targets[:, targets]
+        return np.asarray(np.isfinite(points).all(axis=-1))
+
     def most_held(self, among: Sequence[int] | None = None) -> int:
         """The target, an index from 0, that most rows hold, of all or `among` some."""
         places = list(range(self.target_count)) if among is None else list(among)
-        held = np.isfinite(self.targets[:, places]).all(axis=2).sum(axis=0)
+        held = self.seen(places).sum(axis=0)
         return places[int(held.argmax())]
 
     def row_names(self, mask: NDArray[np.bool_]) -> str:

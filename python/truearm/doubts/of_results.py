@@ -259,7 +259,7 @@ def orientations_left_out(data: Measurements, selection: Selection, use: str | N
     """A warning where orientations were measured and several targets are fitted in their place."""
     if use is not None or selection.orientation or data.orientations is None:
         return []
-    count = int(np.isfinite(data.orientations).all(axis=1).sum())
+    count = int(data.oriented.sum())
     if not count:
         return []
     text = (

@@ -260,7 +260,7 @@ def row_errors(
     left = residuals(problem, np.ascontiguousarray(parameters), setup)
     if selection.distances:
         return RowErrors(at_first_measured(left, data, selection))
-    seen = np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
+    seen = data.seen(selection.targets)
     if not seen.any():
         listed = " or ".join(str(target + 1) for target in selection.targets)
         raise InputError(
@@ -271,8 +271,7 @@ def row_errors(
     position = _where_seen(np.asarray(seen.any(axis=1)), at_first_measured(left, data, selection))
     if not selection.orientation or data.orientations is None:
         return RowErrors(position)
-    turned = np.isfinite(data.orientations).all(axis=1)
-    return RowErrors(position, _where_seen(np.asarray(turned), left[:, -3:]))
+    return RowErrors(position, _where_seen(data.oriented, left[:, -3:]))
 
 
 def at_first_measured(residuals: Floats, data: Measurements, selection: Selection) -> Floats:

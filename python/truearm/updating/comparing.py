@@ -325,9 +325,9 @@ def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, option
 
 
 def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
-    scene_values = 3 * int(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum())
-    if task.selection.orientation and data.orientations is not None:
-        scene_values += 3 * int(np.isfinite(data.orientations).all(axis=1).sum())
+    scene_values = 3 * int(data.seen(task.selection.targets).sum())
+    if task.selection.orientation:
+        scene_values += 3 * int(data.oriented.sum())
     wanted = int(unknowns.free.sum())
     if scene_values > wanted:
         return
@@ -345,8 +345,7 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 def _check_groups(data: Measurements, task: Task) -> None:
     """Each pose is judged by the others: they have to find its frame and target."""
     fewest = FOUND_FROM + -(-len(data) // MOST_PARTS)
-    points = np.isfinite(data.targets[:, list(task.selection.targets)])
-    seen = np.logical_or.reduce(np.logical_and.reduce(points, axis=2), axis=1)
+    seen = data.seen(task.selection.targets).any(axis=1)
     for group in task.groups:
         count = int((seen & (data.group == group)).sum())
         if count < fewest:
