@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm import kinds
-from truearm._core import ANGLE_ARM_M, Setup, fit_constant
+from truearm._core import ANGLE_ARM_M, Setup
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
@@ -18,15 +18,9 @@ from truearm.doubts.plausibility import check_against
 from truearm.doubts.points_together import points_together
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
-from truearm.fits.core_set import Selection, Use, core_set, rotations, select, select_fitted
+from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
 from truearm.fits.fitted_rows import known_rows
-from truearm.fits.fitting import (
-    Stages,
-    Task,
-    core_errors,
-    fit_options,
-    no_stages,
-)
+from truearm.fits.fitting import Stages, Task, fit_setup, no_stages
 from truearm.fits.measured_parts import held_parts
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.frame_rows import divide
@@ -258,11 +252,7 @@ def _setup(
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
     if options.keep_tool:
         return _registered(task, calibration, data, parameters, _stored(task, calibration, model.setup))
-    measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    with core_errors(data):
-        return fit_constant(
-            task.problem(measured, []), fit_options(task.threads, parameters=parameters)
-        ).setup
+    return fit_setup(task, data, parameters).setup
 
 
 def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
@@ -324,10 +314,7 @@ def _gross(
     outliers = gross_judged_rows(judged, once, held[1])
     changed = not_as_calibrated(judged, once, held[1])
     if finds["finds_tool"]:
-        measured = core_set(task.arm.robot, frame, task.selection, task.groups)
-        with core_errors(frame):
-            chosen = fit_options(task.threads, parameters=of_frame.parameters, robust="cauchy")
-            setup = fit_constant(task.problem(measured, []), chosen).setup
+        setup = fit_setup(task, frame, of_frame.parameters, robust="cauchy").setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))
     spoiled = gross_frame_rows(of_frame)
     if options.keep_frames or spoiled:

@@ -305,6 +305,18 @@ def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data:
     return fit_scheme(task.options.model, rows, task.options.scheme)
 
 
+def fit_setup(task: Task, data: Measurements, parameters: Floats, robust: str | None = None) -> ConstantFit:
+    """Frames and targets alone of the set-ups of a task, with the arm's `parameters` (n, L, 5) as they are.
+
+    Raises:
+        WorkError: If the rows determine too little.
+    """
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    options = fit_options(task.threads, robust=robust, parameters=parameters)
+    with core_errors(data):
+        return fit_constant(task.problem(measured, []), options)
+
+
 def fit_options(
     threads: int | None,
     prior: tuple[float, float, bool] | None = None,
