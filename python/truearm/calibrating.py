@@ -12,6 +12,7 @@ from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import counted_covariance, standard_errors
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
+from truearm.doubts.admitted import admitted
 from truearm.doubts.conventions import fits_otherwise
 from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
@@ -31,8 +32,6 @@ from truearm.doubts.of_results import (
     stated_too_large,
     stood_still,
 )
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
 from truearm.doubts.row_order import order_notices
@@ -115,10 +114,9 @@ def calibrate(
         WorkError: If the rows determine too little.
     """
     chosen = kinds.chosen(Options, options, more, Options.of)
-    robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
-    notices = check_against(given, robot)
-    given, together = points_together(given.deduplicated())
-    notices += [*together, *stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
+    robot = kinds.required(robot, Robot, "the robot")
+    given, notices = admitted(Measurements.of(data), robot)
+    notices += [*stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)

@@ -11,11 +11,10 @@ from truearm import kinds
 from truearm._core import ANGLE_ARM_M, Setup
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
+from truearm.doubts.admitted import admitted
 from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.doubts.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.doubts.of_results import NO_HELP, no_help
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
@@ -150,10 +149,9 @@ def evaluate(
     """
     chosen = kinds.chosen(EvaluationOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
-    notices = check_against(data, calibration.robot)
-    data, together = points_together(data.deduplicated())
+    data, notices = admitted(data, calibration.robot)
     selection, left_out = _selection(calibration, data, chosen)
-    notices += [*together, *known_rows(calibration, data), *rows_beyond_learnt(calibration, data), *left_out]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data), *left_out]
     if selection.orientation:
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)

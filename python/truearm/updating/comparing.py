@@ -8,9 +8,8 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
+from truearm.doubts.admitted import admitted
 from truearm.doubts.of_results import LARGE_MM
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import (
     InputError,
@@ -174,9 +173,7 @@ def update(
     """
     chosen = kinds.chosen(UpdateOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
-    notices = check_against(data, calibration.robot)
-    data, together = points_together(data.deduplicated())
-    notices += together
+    data, notices = admitted(data, calibration.robot)
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data = one_row_a_visit(data)
     task, left_out = _task(calibration, data, chosen, stages)
