@@ -61,10 +61,9 @@ def robot_notices(robot: RobotData) -> list[Notice]:
 
 def _limits_in_degrees(robot: RobotData) -> list[Notice]:
     """A notice of revolute joints whose limits, in rad, are whole numbers beyond two turns."""
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
     limits = np.where(np.isfinite(robot.limits), np.abs(robot.limits), 0.0)
     whole = np.abs(limits - np.round(limits)) < WHOLE_TOLERANCE
-    strange = revolute & ((limits > STRANGE_LIMIT_RAD) & whole).any(axis=1)
+    strange = robot.revolute & ((limits > STRANGE_LIMIT_RAD) & whole).any(axis=1)
     if not strange.any():
         return []
     links = (np.flatnonzero(strange) + 1).tolist()

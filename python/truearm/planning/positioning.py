@@ -21,6 +21,7 @@ STEPS: Final = 12
 LARGEST_STEP: Final = 0.3
 REACHED_M: Final = 1e-9
 TURN: Final = 2.0 * np.pi
+OPEN_REACH_M: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +89,7 @@ class PositionInverse:
 
     @cached_property
     def _starts(self) -> Floats:
-        low, high = self.robot.limits.T
-        reach = np.array([np.pi if kind == "revolute" else 0.5 for kind in self.robot.joints])
-        low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+        low, high = self.robot.finite_limits(OPEN_REACH_M)
         readings = np.tile(np.asarray(self.held, dtype=np.float64), (STARTS, 1))
         drawn = np.random.default_rng(0).uniform(low, high, readings.shape)
         readings[:, self._columns] = drawn[:, self._columns]

@@ -124,8 +124,7 @@ class NearestTurns:
 
 def _turning(robot: RobotData) -> Bools:
     """Joints (N,) of which a full turn more is the same pose: all that is coupled to them turns fully too."""
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
-    same = np.where(revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
+    same = np.where(robot.revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
     return np.asarray(same.all(axis=0))
 
 

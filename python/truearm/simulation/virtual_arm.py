@@ -101,7 +101,7 @@ class VirtualArm:
         self._true_table = nominal_rows(robot) + self.errors
         thermal = self.imperfections.thermal
         self._drift = None if thermal is None else stated_rows(robot, thermal.drift_per_k)
-        self._waving = [j for j, kind in enumerate(robot.joints) if kind == "revolute"][:MAJOR_JOINTS]
+        self._waving = np.flatnonzero(robot.revolute)[:MAJOR_JOINTS].tolist()
         outputs = 3 if self.imperfections.non_geometric == "cartesian" else len(self._waving)
         self._harmonics = rng.normal(scale=DRAWN_HARMONIC, size=(2 * len(self._waving), outputs))
         self._harmonics *= self._scale_to_share()
