@@ -27,12 +27,10 @@ from truearm.fits.fitting import (
     NOTHING_KNOWN,
     Fits,
     KnownHyper,
-    Stages,
     Task,
     feature_ranges,
     feature_values,
     fit_rows,
-    no_stages,
 )
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.known_scale import KnownScale, common_share
@@ -50,6 +48,7 @@ from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rows.splitting import Split, split_rows
 from truearm.rows.visits import pose_count, pose_counts
+from truearm.stages import Stages, no_stages
 from truearm.tables.columns import VALIDATE
 from truearm.units import MM_PER_METRE
 

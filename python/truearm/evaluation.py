@@ -19,7 +19,7 @@ from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
 from truearm.fits.fitted_rows import known_rows
-from truearm.fits.fitting import Stages, Task, fit_setup, no_stages
+from truearm.fits.fitting import Task, fit_setup
 from truearm.fits.measured_parts import held_parts
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.frame_rows import divide
@@ -40,6 +40,7 @@ from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
+from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
 from truearm.units import MM_PER_METRE
 

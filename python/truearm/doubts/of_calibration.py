@@ -34,7 +34,7 @@ from truearm.errors import Notice
 from truearm.fits.details import VariableDetails, left_m
 from truearm.fits.endpoints import at_tool
 from truearm.fits.enough_values import group_unknowns
-from truearm.fits.fitting import Fits, Stages, Task
+from truearm.fits.fitting import Fits, Task
 from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
 from truearm.judgement.judging import check_judged
@@ -42,6 +42,7 @@ from truearm.judgement.validation import Validation
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
+from truearm.stages import Stages
 from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
 
 Floats = NDArray[np.float64]

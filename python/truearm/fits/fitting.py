@@ -1,8 +1,8 @@
 """The three fits of one set of rows: frame and tool alone, constants, and what varies."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -31,10 +31,10 @@ from truearm.inputs import is_payload
 from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_pose
+from truearm.stages import Stages, no_stages
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
-Stages = Callable[[str], AbstractContextManager[Any]]
 
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
@@ -52,11 +52,6 @@ OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
 """Share of all squares that constants leave from which rows that are taken out have bent them."""
-
-
-def no_stages(_: str) -> AbstractContextManager[None]:
-    """Says nothing about the stages of the work."""
-    return nullcontext()
 
 
 @dataclass(frozen=True, eq=False)

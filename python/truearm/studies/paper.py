@@ -1,7 +1,7 @@
 """The paper's simulations, section 6: each figure for one seed, and all of them over seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, closing
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import UsageError
-from truearm.fits.fitting import no_stages
 from truearm.planning.pool import PoolOptions, draw_pool
+from truearm.stages import Stages, no_stages
 from truearm.studies.experiment import Experiment, Plan, conduct
 from truearm.studies.metrics import Trace, along, over_seeds, sizes, trace
 from truearm.studies.schemes import (
@@ -39,7 +39,6 @@ from truearm.studies.setting import (
 from truearm.workers import check_workers, run_tasks
 
 Floats = NDArray[np.float64]
-Stages = Callable[[str], AbstractContextManager[Any]]
 Result = dict[str, Any]
 
 FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")

@@ -23,12 +23,13 @@ from truearm.errors import (
 )
 from truearm.fits.core_set import select_fitted
 from truearm.fits.fitted_rows import known_rows, overwhelming
-from truearm.fits.fitting import Stages, Task, no_stages
+from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_visit
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
+from truearm.stages import Stages, no_stages
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
