@@ -17,6 +17,8 @@ STATED_LENGTH_UNITS: Final = ("in", *LENGTH_UNITS)
 """What a table that is brought in may be in."""
 ANGLE_UNITS: Final = ("rad", "deg")
 RADIANS_PER_DEGREE: Final = math.pi / 180.0
+FULL_TURN: Final = 2.0 * math.pi
+"""In radians."""
 MM_PER_METRE: Final = 1e3
 MRAD_PER_RAD: Final = 1e3
 MM_PER_INCH: Final = 25.4

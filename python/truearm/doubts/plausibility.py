@@ -15,7 +15,7 @@ from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
-from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -325,7 +325,7 @@ def _way_out_of_large(measured: float, nominal: float, columns: str = "x_mm, y_m
 def _could_be_radians(group: Measurements, robot: Robot) -> bool:
     degrees = np.array(group.joint_units) == "deg"
     values = group.readings[:, degrees] / RADIANS_PER_DEGREE
-    return bool(degrees.any()) and bool((np.abs(values) <= 2.0 * np.pi).all())
+    return bool(degrees.any()) and bool((np.abs(values) <= FULL_TURN).all())
 
 
 def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:

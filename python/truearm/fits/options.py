@@ -13,6 +13,7 @@ from truearm.fits.parameters import PARALLEL_WITHIN_DEG
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.fits.schemes import FCMAC, NETWORKS, SCHEMES
 from truearm.rows.splitting import SplitRule
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
 Robust = Literal["none", "huber", "cauchy"]
@@ -90,7 +91,7 @@ class Options:
     @property
     def prior(self) -> tuple[float, float, bool]:
         """Standard deviations of lengths (m) and angles (rad), and that the evidence scales them."""
-        return self.prior_mm / 1e3, self.prior_mrad / 1e3, True
+        return self.prior_mm / MM_PER_METRE, self.prior_mrad / MRAD_PER_RAD, True
 
     @classmethod
     def of(cls, **given: Any) -> "Options":

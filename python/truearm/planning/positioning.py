@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from truearm.planning.configurations import Configuration
 from truearm.robot import Robot
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,7 +21,6 @@ STARTS_TRIED: Final = 3
 STEPS: Final = 12
 LARGEST_STEP: Final = 0.3
 REACHED_M: Final = 1e-9
-TURN: Final = 2.0 * np.pi
 OPEN_REACH_M: Final = 0.5
 
 
@@ -80,7 +80,7 @@ class PositionInverse:
             for column in self._columns
             if self.robot.joints[column] == "revolute" and not np.isfinite(self.robot.limits[column]).any()
         ]
-        readings[:, free] = (readings[:, free] + np.pi) % TURN - np.pi
+        readings[:, free] = (readings[:, free] + np.pi) % FULL_TURN - np.pi
         return readings
 
     @property
