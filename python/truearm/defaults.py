@@ -68,6 +68,9 @@ TOOL_MM: Final = 5.0
 LEVEL: Final = 0.01
 """Share of the unchanged arms of which an update may say that something changed."""
 
+PAPER_FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
+"""Figures of the paper that its study draws."""
+
 PAPER_REGIONS: Final = 85
 """Into how many regions the experiment of the paper divides the space."""
 

@@ -318,10 +318,14 @@ def _gross(
     spoiled = gross_frame_rows(of_frame)
     if options.keep_frames or spoiled:
         return spoiled, outliers, changed
-    details = calibration.constant
-    lever_m = details.noise_m / details.noise_rad if details.noise_rad > 0.0 else ANGLE_ARM_M
-    found = FoundSetUps(task, model, frame, options.keep_tool, lever_m)
+    found = FoundSetUps(task, model, frame, options.keep_tool, _lever_m(calibration))
     return spoiled, [*outliers, *found.notices(held[0], held[1].errors[calibration.model_name])], changed
+
+
+def _lever_m(calibration: Calibration) -> float:
+    """Noise of positions over that of orientations, m/rad."""
+    details = calibration.constant
+    return details.noise_m / details.noise_rad if details.noise_rad > 0.0 else ANGLE_ARM_M
 
 
 def _kept(task: Task, calibration: Calibration) -> tuple[list[int], list[int]]:
@@ -372,9 +376,7 @@ def _registered(
     joints = task.arm.robot.joints_from_readings(data.readings)
     flange = task.arm.flange_chain.pose(joints, parameters)
     measured, turned = data.targets[:, list(task.selection.targets)], rotations(data)
-    frames = []
-    details = calibration.constant
-    lever = details.noise_m / details.noise_rad if task.selection.orientation else 0.0
+    frames, lever_m = [], _lever_m(calibration)
     for number, group in enumerate(task.groups):
         rows = data.group == group
         points = flange[rows, None, :3, 3] + np.einsum(
@@ -386,6 +388,6 @@ def _registered(
         # Where no row holds what is known on the tool nothing is judged.
         frame = known.frames[number]
         if seen.any():
-            frame = register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever)
+            frame = register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever_m)
         frames.append(frame)
     return Setup(np.stack(frames), known.targets, known.rotations, known.anchors)

@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 
 MILLI = 1e-3
 FEW_HELD = 30
+STATISTICS: Final = ("mean", "rms", "p95", "p99", "max")
+HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
+"""What tables call them."""
 MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
 """Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
 MEAN_SIZE: Final = math.sqrt(2.0 / math.pi)
