@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Use = Literal["position", "pose", "targets"]
 
-USES: Final = ("position", "pose", "targets")
+USES: Final = get_args(Use)
 
 
 @dataclass(frozen=True)
