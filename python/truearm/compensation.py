@@ -231,7 +231,7 @@ class Compensator:
 
     @property
     def named_features(self) -> dict[str, float]:
-        """The same by name."""
+        """Values of the features that the calibration depends on, by name."""
         return dict(zip(self.feature_names, self._features, strict=True))
 
     def corrector(self, tool: ArrayLike | None = None) -> Corrector:

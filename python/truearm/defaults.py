@@ -63,7 +63,7 @@ OFFSET_DEG: Final = 1.0
 """Standard deviation of the change of a revolute joint's offset before an update."""
 
 TOOL_MM: Final = 5.0
-"""The same of each coordinate of the target on the tool."""
+"""Standard deviation of the change of each coordinate of the target on the tool before an update."""
 
 LEVEL: Final = 0.01
 """Share of the unchanged arms of which an update may say that something changed."""

@@ -165,7 +165,7 @@ class Robot(RobotData):
     def from_urdf_text(
         cls, text: str, base_link: str | None = None, tip_link: str | None = None, *, where: str = "URDF"
     ) -> "Robot":
-        """The same from the text of a URDF; `where` names it in messages.
+        """A robot from the chain of a URDF that is given as text; `where` names it in messages.
 
         Raises:
             InputError: As :meth:`from_urdf`.

@@ -47,7 +47,7 @@ SUSPECTED: Final = 1e-4
 CLEARER: Final = 0.7
 """Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
 PROMISING: Final = 0.85
-"""The same ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
+"""That ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1

@@ -26,7 +26,7 @@ HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
 MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
 """Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
 MEAN_SIZE: Final = math.sqrt(2.0 / math.pi)
-"""The same of one coordinate, as of distances."""
+"""Mean absolute value of one such coordinate, as of distances."""
 
 
 @dataclass(frozen=True)

@@ -225,7 +225,7 @@ class VirtualArm:
         orientation: bool = False,
         conditions: Conditions | None = None,
     ) -> pd.DataFrame:
-        """The same as a table with columns q1 ... qN in rad and m, x y z in m, and qw qx qy qz if asked.
+        """What `measure` gives, as columns q1 ... qN in rad and m, x y z in m, and qw qx qy qz if asked.
 
         Where the conditions say so, payload_kg and temperature_c are further columns.
 
