@@ -13,11 +13,12 @@ from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import counted_covariance, standard_errors
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.doubts.admitted import admitted
-from truearm.doubts.of_calibration import of_fit, of_left, of_result, of_split, over_time
+from truearm.doubts.of_calibration import of_fit, of_left, of_result, of_split
 from truearm.doubts.of_results import orientations_left_out, seen_at_values, stood_still
+from truearm.doubts.row_order import order_notices
 from truearm.doubts.turning_sense import check_turns
 from truearm.doubts.unexplained import unexplained
-from truearm.drifting import Drift, drift_details, fit_settled
+from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.fits.core_set import select
 from truearm.fits.details import ConstantDetails, VariableDetails, left_m
@@ -122,13 +123,18 @@ def calibrate(
             *notices,
             *astray,
             *of_fit(task, final, variable),
-            *over_time(task, given, drift, validation),
+            *_over_time(task, given, drift, validation),
         ),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
     told = [*of_result(task, found, given, stages), *of_left(found, drift.progress[order])]
     return replace(found, notices=(*found.notices, *told))
+
+
+def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation) -> list[Notice]:
+    """What the order of the rows tells and hides."""
+    return [*order_notices(task, data, drift.progress), *drift_notices(judged.drift)]
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:

@@ -26,10 +26,8 @@ from truearm.doubts.of_results import (
 )
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
-from truearm.doubts.row_order import order_notices
 from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.whitened import Whitened
-from truearm.drifting import Drift, drift_notices
 from truearm.errors import Notice
 from truearm.fits.details import VariableDetails, left_m
 from truearm.fits.endpoints import at_tool
@@ -38,7 +36,6 @@ from truearm.fits.fitting import Fits, Task
 from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
 from truearm.judgement.judging import check_judged
-from truearm.judgement.validation import Validation
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
@@ -80,11 +77,6 @@ def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[
         "target's on the flange is known, and corrections for other tools depend on that."
     )
     return [Notice(OPEN_SETUP, text)]
-
-
-def over_time(task: Task, data: Measurements, drift: Drift, judged: Validation) -> list[Notice]:
-    """What the order of the rows tells and hides."""
-    return [*order_notices(task, data, drift.progress), *drift_notices(judged.drift)]
 
 
 def of_left(found: Calibration, progress: Floats) -> list[Notice]:
