@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 import truearm as ta
-from truearm.calibrating import OPEN_SETUP
 from truearm.doubts.held_tool import never_turns_freely
+from truearm.doubts.of_calibration import OPEN_SETUP
 from truearm.errors import Notice
 from truearm.fleet import Fleet, run_fleet
 from truearm.fleet.doubted import grave_notices

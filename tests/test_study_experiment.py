@@ -12,7 +12,7 @@ from distributed import LocalCluster
 from truearm.cell.session import Session
 from truearm.cli import main
 from truearm.errors import InputError, WorkError
-from truearm.fits.fitting import no_stages
+from truearm.stages import no_stages
 from truearm.studies.process import judging, several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space

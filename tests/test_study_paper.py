@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from truearm.cli import main
+from truearm.defaults import PAPER_FIGURES
 from truearm.errors import UsageError
 from truearm.studies import paper, paper_results, setting
 from truearm.studies.claims import CLAIMS, judged
@@ -28,7 +29,7 @@ def study():
     patch.setattr(paper, "SPHERE_REGIONS", 8)
     patch.setattr(paper, "READINGS", setting.READINGS[::2])
     patch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
-    yield conduct_study([0], paper.FIGURES)
+    yield conduct_study([0], PAPER_FIGURES)
     patch.undo()
 
 

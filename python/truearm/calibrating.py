@@ -12,71 +12,44 @@ from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import counted_covariance, standard_errors
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
-from truearm.doubts.conventions import fits_otherwise
-from truearm.doubts.distance_zero import zero_notices
-from truearm.doubts.exchanged import exchanges
-from truearm.doubts.known_world import another_frame
-from truearm.doubts.moved_joints import moved_joints
-from truearm.doubts.of_results import (
-    FAR_FROM_NOMINAL,
-    NO_HELP,
-    SINGLE_ROWS,
-    Outliers,
-    constant_is_better,
-    doubts,
-    mounting,
-    orientations_left_out,
-    poses_aside,
-    seen_at_values,
-    stated_too_large,
-    stood_still,
-)
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
-from truearm.doubts.rounded_readings import rounded_notices
-from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.admitted import admitted
+from truearm.doubts.of_calibration import of_fit, of_left, of_result, of_split
+from truearm.doubts.of_results import orientations_left_out, seen_at_values, stood_still
 from truearm.doubts.row_order import order_notices
 from truearm.doubts.turning_sense import check_turns
-from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.unexplained import unexplained
-from truearm.doubts.whitened import Whitened
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.fits.core_set import select
 from truearm.fits.details import ConstantDetails, VariableDetails, left_m
-from truearm.fits.endpoints import at_tool
-from truearm.fits.enough_values import group_unknowns
 from truearm.fits.fitted_rows import FittedRows, sides
 from truearm.fits.fitting import (
     ENOUGH_FOR_HYPER,
     NOTHING_KNOWN,
     Fits,
     KnownHyper,
-    Stages,
     Task,
     feature_ranges,
     feature_values,
     fit_rows,
-    no_stages,
 )
-from truearm.fits.identifiability import Identifiability
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import MeasuredParts, sureness
-from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.fits.models import NOMINAL, VARIABLE
 from truearm.fits.options import Options
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.fits.schemes import NETWORKS, REGIONS
 from truearm.intervals import interval_coverage
 from truearm.judgement.held_rows import HeldRows
-from truearm.judgement.judging import check_judged, judge, where_found
+from truearm.judgement.judging import judge, where_found
 from truearm.judgement.validation import Validation
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
-from truearm.rows.splitting import Split, measured_on_both_sides, split_rows
+from truearm.rows.splitting import Split, split_rows
 from truearm.rows.visits import pose_count, pose_counts
-from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
+from truearm.stages import Stages, no_stages
 from truearm.tables.columns import VALIDATE
 from truearm.units import MM_PER_METRE
 
@@ -87,7 +60,6 @@ STUCK: Final = 0.2
 ASTRAY: Final = 2.0
 """Ratio of the median errors of held-out rows, known and not, from which a fit went astray."""
 REFIT_ASTRAY: Final = "refit_astray"
-OPEN_SETUP: Final = "open_setup"
 
 
 def calibrate(
@@ -115,14 +87,13 @@ def calibrate(
         WorkError: If the rows determine too little.
     """
     chosen = kinds.chosen(Options, options, more, Options.of)
-    robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
-    notices = check_against(given, robot)
-    given, together = points_together(given.deduplicated())
-    notices += [*together, *stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
+    robot = kinds.required(robot, Robot, "the robot")
+    given, notices = admitted(Measurements.of(data), robot)
+    notices += [*stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
-    notices += _of_split(task, given, split)
+    notices += of_split(task, given, split)
     task = replace(task, sizes=() if split.planned else pose_counts(given))
     order = np.random.default_rng(chosen.split.seed).permutation(len(given)) if chosen.refit else split.train
     trained, drift, final = _fit_both(task, given, split.train, order)
@@ -151,107 +122,19 @@ def calibrate(
         notices=(
             *notices,
             *astray,
-            *_of_fit(task, final, variable),
+            *of_fit(task, final, variable),
             *_over_time(task, given, drift, validation),
         ),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
-    told = [*_doubts(task, found, given, stages), *_of_left(found, drift.progress[order])]
+    told = [*of_result(task, found, given, stages), *of_left(found, drift.progress[order])]
     return replace(found, notices=(*found.notices, *told))
-
-
-def _of_left(found: Calibration, progress: Floats) -> list[Notice]:
-    """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
-    if found.rows is None or found.scheme is not None or found.selection.distances:
-        return []
-    seen = Whitened.of(found, found.rows, progress)
-    return [*uneven_setups(found, found.rows, seen), *moved_joints(found, seen, progress)]
-
-
-def _of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
-    """Of which held-out rows errors say less, and which are not judged."""
-    train, held = given.select(split.train), given.select(split.holdout)
-    return [*measured_on_both_sides(given, split), *check_judged(train, held, task.selection)]
 
 
 def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation) -> list[Notice]:
     """What the order of the rows tells and hides."""
     return [*order_notices(task, data, drift.progress), *drift_notices(judged.drift)]
-
-
-def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
-    """What makes a calibration doubtful; where it does not help, or found another arm, with what would
-    fit instead.
-    """
-    doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
-    if _many_are_off(found, doubted):
-        with stages("looking for lost rows"):
-            shifted = fits_shifted(task, data)
-    if shifted:
-        doubted = _of_errors(task, found, data, None)
-        return [*doubted[:1], *shifted, *doubted[1:]]
-    framed = _framed(task, found)
-    exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
-    if exchanged.notices:
-        told = replace(found, notices=exchanged.notices)
-        doubted = _of_errors(task, told, data, Outliers.of(told), exchanged.unbent)
-    doubted[1:1] = framed
-    wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
-    if not framed and any(notice.kind in wrong for notice in doubted):
-        with stages("trying other conventions"):
-            doubted[1:1] = fits_otherwise(task, data)
-    return [*exchanged.notices, *doubted]
-
-
-def _is_in_doubt(doubted: Sequence[Notice]) -> bool:
-    """Whether errors or parameters are such that rows may be wrong of which none is an outlier."""
-    return any(notice.kind in {NO_HELP, SINGLE_ROWS, FAR_FROM_NOMINAL} for notice in doubted)
-
-
-def _framed(task: Task, found: Calibration) -> list[Notice]:
-    """Whether rows of a known world would fit far better with a frame that is found."""
-    left = left_m(found.constant, found.variable)
-    return [] if found.rows is None else another_frame(task, found.rows.fitted, left)
-
-
-def _of_errors(
-    task: Task,
-    found: Calibration,
-    data: Measurements,
-    outliers: Outliers | None,
-    unbent: ArmModel | None = None,
-) -> list[Notice]:
-    """What the errors of a calibration say against it, and which outliers may be to blame.
-
-    Constants that these did not bend are held against the table in place of its own, if there are such.
-    """
-    judged, best = found.validation, found.model_name
-    points = None if found.selection.distances else found.held
-    models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
-    return [
-        *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
-        *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data, judged, best, points),
-        *constant_is_better(judged, best, points, outliers),
-        *_rounded(found, data),
-    ]
-
-
-def _rounded(found: Calibration, data: Measurements) -> list[Notice]:
-    """Whether readings have so few decimals that what is taken for noise is theirs."""
-    points = found.measured.points(found.model.setup.targets)
-    if found.selection.distances or not len(points):
-        return []
-    at_point = replace(found.robot, tool=at_tool(found.robot, points[0]))
-    return rounded_notices(at_point, data.readings, whole_noise_mm(found))
-
-
-def _many_are_off(found: Calibration, doubted: Sequence[Notice]) -> bool:
-    """Whether so many rows are off, or off from some row on, that they may belong to other points."""
-    drift, outliers = found.validation.drift, [] if found.rows is None else found.rows.outliers()
-    of_no_use = any(notice.kind in {NO_HELP, SINGLE_ROWS} for notice in doubted)
-    return of_no_use or len(outliers) > CHANGE or (drift is not None and bool(drift.jumps))
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:
@@ -341,32 +224,6 @@ def _fitted_rows(
     return replace(rows, data=data.select(order), moved=drift.moved[order], progress=drift.progress[order])
 
 
-def _of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
-    """What the last fit shows of the set-up and of how the arm stands."""
-    aside = 0 if final.variable is None else final.variable.stood_aside
-    return [
-        *_open_setup(task, final.identifiability, final.data),
-        *poses_aside(aside, pose_count(final.data)),
-        *mounting(variable),
-    ]
-
-
-def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:
-    """A notice where frames and targets cannot all be told apart, as on a SCARA or from poses too alike."""
-    if task.selection.distances:
-        return []
-    unknowns = sum(group_unknowns(task, data.select(data.group == group)) for group in task.groups)
-    rank = found.total_rank - found.rank
-    if rank >= unknowns:
-        return []
-    text = (
-        f"The poses determine {rank} of {unknowns} unknowns of frame and target: predictions of the measured "
-        "target are not harmed, but along what is left open neither the base's place in the world nor the "
-        "target's on the flange is known, and corrections for other tools depend on that."
-    )
-    return [Notice(OPEN_SETUP, text)]
-
-
 def _fitted_spread(
     task: Task, fits: Fits, details: VariableDetails | None, measured: MeasuredParts
 ) -> VariableSpread | None:
@@ -380,9 +237,8 @@ def _fitted_spread(
 
 def _measured(task: Task, fits: Fits, left: float) -> MeasuredParts:
     """What the rows of each set-up hold of what was fitted, of which the model leaves so much, m."""
-    fit, sigma = fits.variable or fits.constant, fits.data.sigma_m
-    own = np.zeros(len(fits.data)) if sigma is None else np.nan_to_num(sigma)
-    return MeasuredParts.of(fits.data, task.selection, task.groups, sureness(own, left, fit.weights))
+    sure = sureness(fits.data.stated_sigma_m, left, (fits.variable or fits.constant).weights)
+    return MeasuredParts.of(fits.data, task.selection, task.groups, sure)
 
 
 def _fit_both(

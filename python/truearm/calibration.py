@@ -130,7 +130,7 @@ class Calibration:
         return _restored, (content, dict(self.seconds), file)
 
     def without_rows(self) -> "Calibration":
-        """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
+        """This one as a file without the measurements holds it, with the bounds of the standard deviation."""
         bounds = self.conservative if self.has_conservative else None
         revision = None if self.revision is None else self.revision.stripped()
         return replace(
@@ -297,7 +297,7 @@ class Calibration:
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
-        """The same of position and rotation vector of `pose`, (n, 6), m and rad.
+        """As `position_std`, of position and rotation vector of `pose`, (n, 6), m and rad.
 
         Where the orientation of a target was measured, how it is turned on the flange is seen as well.
 

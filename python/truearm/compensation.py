@@ -26,11 +26,11 @@ from truearm.solving import (
     feature_values,
     plain_model,
 )
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Floats = NDArray[np.float64]
 
-TO_SHOWN: Final = np.array([MM_PER_METRE, 1e3, MM_PER_METRE, 1e3, MM_PER_METRE])
+TO_SHOWN: Final = np.array([MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE])
 TOOLS_KEPT: Final = 16
 
 
@@ -231,7 +231,7 @@ class Compensator:
 
     @property
     def named_features(self) -> dict[str, float]:
-        """The same by name."""
+        """Values of the features that the calibration depends on, by name."""
         return dict(zip(self.feature_names, self._features, strict=True))
 
     def corrector(self, tool: ArrayLike | None = None) -> Corrector:

@@ -63,10 +63,13 @@ OFFSET_DEG: Final = 1.0
 """Standard deviation of the change of a revolute joint's offset before an update."""
 
 TOOL_MM: Final = 5.0
-"""The same of each coordinate of the target on the tool."""
+"""Standard deviation of the change of each coordinate of the target on the tool before an update."""
 
 LEVEL: Final = 0.01
 """Share of the unchanged arms of which an update may say that something changed."""
+
+PAPER_FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
+"""Figures of the paper that its study draws."""
 
 PAPER_REGIONS: Final = 85
 """Into how many regions the experiment of the paper divides the space."""

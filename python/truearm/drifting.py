@@ -205,12 +205,11 @@ def _residuals_in_world(task: Task, fit: FieldFit, data: Measurements) -> tuple[
     adds to the noise that all have.
     """
     count = len(task.selection.targets)
-    seen = np.asarray(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2))
+    seen = data.seen(task.selection.targets)
     left = fit.residuals[:, : 3 * count].reshape(-1, count, 3)
     mean = (left * seen[:, :, None]).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
-    sigma = np.zeros(len(data)) if data.sigma_m is None else np.nan_to_num(data.sigma_m)
     noise = unexplained(task, fit, data)
-    weight = fit.weights * seen.any(axis=1) / (1.0 + np.square(sigma / noise))
+    weight = fit.weights * seen.any(axis=1) / (1.0 + np.square(data.stated_sigma_m / noise))
     return _turned(mean, data, task.groups, fit.setup), weight
 
 

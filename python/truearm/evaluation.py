@@ -8,25 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm import kinds
-from truearm._core import ANGLE_ARM_M, Setup, fit_constant
+from truearm._core import ANGLE_ARM_M, Setup
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
+from truearm.doubts.admitted import admitted
 from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.doubts.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.doubts.of_results import NO_HELP, no_help
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
-from truearm.fits.core_set import Selection, Use, core_set, rotations, select, select_fitted
+from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
 from truearm.fits.fitted_rows import known_rows
-from truearm.fits.fitting import (
-    Stages,
-    Task,
-    core_errors,
-    fit_options,
-    no_stages,
-)
+from truearm.fits.fitting import Task, fit_setup
 from truearm.fits.measured_parts import held_parts
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.frame_rows import divide
@@ -47,6 +40,7 @@ from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
+from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
 from truearm.units import MM_PER_METRE
 
@@ -156,10 +150,9 @@ def evaluate(
     """
     chosen = kinds.chosen(EvaluationOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
-    notices = check_against(data, calibration.robot)
-    data, together = points_together(data.deduplicated())
+    data, notices = admitted(data, calibration.robot)
     selection, left_out = _selection(calibration, data, chosen)
-    notices += [*together, *known_rows(calibration, data), *rows_beyond_learnt(calibration, data), *left_out]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data), *left_out]
     if selection.orientation:
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
@@ -258,11 +251,7 @@ def _setup(
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
     if options.keep_tool:
         return _registered(task, calibration, data, parameters, _stored(task, calibration, model.setup))
-    measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    with core_errors(data):
-        return fit_constant(
-            task.problem(measured, []), fit_options(task.threads, parameters=parameters)
-        ).setup
+    return fit_setup(task, data, parameters).setup
 
 
 def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
@@ -324,18 +313,19 @@ def _gross(
     outliers = gross_judged_rows(judged, once, held[1])
     changed = not_as_calibrated(judged, once, held[1])
     if finds["finds_tool"]:
-        measured = core_set(task.arm.robot, frame, task.selection, task.groups)
-        with core_errors(frame):
-            chosen = fit_options(task.threads, parameters=of_frame.parameters, robust="cauchy")
-            setup = fit_constant(task.problem(measured, []), chosen).setup
+        setup = fit_setup(task, frame, of_frame.parameters, robust="cauchy").setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))
     spoiled = gross_frame_rows(of_frame)
     if options.keep_frames or spoiled:
         return spoiled, outliers, changed
-    details = calibration.constant
-    lever_m = details.noise_m / details.noise_rad if details.noise_rad > 0.0 else ANGLE_ARM_M
-    found = FoundSetUps(task, model, frame, options.keep_tool, lever_m)
+    found = FoundSetUps(task, model, frame, options.keep_tool, _lever_m(calibration))
     return spoiled, [*outliers, *found.notices(held[0], held[1].errors[calibration.model_name])], changed
+
+
+def _lever_m(calibration: Calibration) -> float:
+    """Noise of positions over that of orientations, m/rad."""
+    details = calibration.constant
+    return details.noise_m / details.noise_rad if details.noise_rad > 0.0 else ANGLE_ARM_M
 
 
 def _kept(task: Task, calibration: Calibration) -> tuple[list[int], list[int]]:
@@ -386,9 +376,7 @@ def _registered(
     joints = task.arm.robot.joints_from_readings(data.readings)
     flange = task.arm.flange_chain.pose(joints, parameters)
     measured, turned = data.targets[:, list(task.selection.targets)], rotations(data)
-    frames = []
-    details = calibration.constant
-    lever = details.noise_m / details.noise_rad if task.selection.orientation else 0.0
+    frames, lever_m = [], _lever_m(calibration)
     for number, group in enumerate(task.groups):
         rows = data.group == group
         points = flange[rows, None, :3, 3] + np.einsum(
@@ -400,6 +388,6 @@ def _registered(
         # Where no row holds what is known on the tool nothing is judged.
         frame = known.frames[number]
         if seen.any():
-            frame = register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever)
+            frame = register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever_m)
         frames.append(frame)
     return Setup(np.stack(frames), known.targets, known.rotations, known.anchors)

@@ -10,7 +10,7 @@ from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST
 from truearm.errors import UsageError
 from truearm.kinds import check_number
 from truearm.robot import Robot
-from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD, RADIANS_PER_DEGREE
 
 Task = Literal["pose", "axis", "position"]
 TASKS: Final = ("pose", "axis", "position")
@@ -63,7 +63,7 @@ class Limits:
 
     def core(self, robot: Robot) -> dict[str, Any]:
         """The keywords of the core, SI, for an arm."""
-        mm, mrad = 1.0 / MM_PER_METRE, 1e-3
+        mm, mrad = 1.0 / MM_PER_METRE, 1.0 / MRAD_PER_RAD
         return {
             "joints": np.array(robot.limits) if self.joint_limits else np.empty((0, 2)),
             "largest_angle": _si(self.largest_joint_deg, RADIANS_PER_DEGREE),

@@ -23,16 +23,7 @@ from truearm.tables.same_tables import identities, told_apart
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
-CONTENT: Final = (
-    "readings",
-    "targets",
-    "orientations",
-    "sigma_m",
-    "group",
-    "distance_m",
-    "anchor",
-    "pair",
-)
+CONTENT: Final = ("readings", "targets", "orientations", "sigma_m", "group", "distance_m", "anchor", "pair")
 PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")
 NUMBERS: Final = {
     "readings": ("N",),
@@ -161,6 +152,18 @@ class Measurements:
     def sizes(self) -> tuple[int, ...]:
         """How many rows came from each file."""
         return tuple(int((self.sources == file).sum()) for file in self.files)
+
+    @property
+    def stated_sigma_m(self) -> Floats:
+        """What each row states as its standard deviation (n,), zero where it states none."""
+        return np.zeros(len(self)) if self.sigma_m is None else np.nan_to_num(self.sigma_m)
+
+    @property
+    def oriented(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the rows that hold an orientation."""
+        if self.orientations is None:
+            return np.zeros(len(self), dtype=np.bool_)
+        return np.asarray(np.isfinite(self.orientations).all(axis=1))
 
     @classmethod
     def read_csv(
@@ -352,10 +355,15 @@ class Measurements:
             digest.update(np.ascontiguousarray(self.features[column], dtype=np.float64).tobytes())
         return digest.hexdigest()
 
+    def seen(self, targets: int | Sequence[int] | None = None) -> NDArray[np.bool_]:
+        """Which points each row holds: (n, T), (n, t) of `targets`, indices from 0, or (n,) of one target."""
+        points = self.targets if targets is None else self.targets[:, targets]
+        return np.asarray(np.isfinite(points).all(axis=-1))
+
     def most_held(self, among: Sequence[int] | None = None) -> int:
         """The target, an index from 0, that most rows hold, of all or `among` some."""
         places = list(range(self.target_count)) if among is None else list(among)
-        held = np.isfinite(self.targets[:, places]).all(axis=2).sum(axis=0)
+        held = self.seen(places).sum(axis=0)
         return places[int(held.argmax())]
 
     def row_names(self, mask: NDArray[np.bool_]) -> str:
@@ -402,23 +410,24 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
                 f"{part.joint_count} joints in {part.files[0]}, {first.joint_count} in {first.files[0]}",
                 rule="All measurements must be of the same arm",
             )
+    sizes = [len(part) for part in parts]
     return Measurements(
         readings=np.concatenate([part.readings for part in parts]),
         targets=_padded_targets(parts),
-        orientations=_joined([(part.orientations, (len(part), 4)) for part in parts]),
-        sigma_m=_joined([(part.sigma_m, (len(part),)) for part in parts]),
+        orientations=_joined([part.orientations for part in parts], sizes),
+        sigma_m=_joined([part.sigma_m for part in parts], sizes),
         group=np.concatenate([part.group for part in parts]),
         features=pd.concat([part.features for part in parts], ignore_index=True),
         sources=np.concatenate([part.sources for part in parts]),
         rows=np.concatenate([part.rows for part in parts]),
         joint_units=_common_units(parts),
-        distance_m=_joined([(part.distance_m, (len(part),)) for part in parts]),
-        anchor=_joined_words([(part.anchor, len(part)) for part in parts]),
-        purpose=_joined_words([(part.purpose, len(part)) for part in parts]),
-        pair=_joined_words([(_own_pairs(part, k), len(part)) for k, part in enumerate(parts)]),
+        distance_m=_joined([part.distance_m for part in parts], sizes),
+        anchor=_joined([part.anchor for part in parts], sizes, ""),
+        purpose=_joined([part.purpose for part in parts], sizes, ""),
+        pair=_joined([_own_pairs(part, k) for k, part in enumerate(parts)], sizes, ""),
         notices=tuple(notice for part in parts for notice in part.notices),
-        default_group=_joined_words([(part.default_group, len(part)) for part in parts]),
-        tables=_joined_tables(parts),
+        default_group=_joined([part.default_group for part in parts], sizes, ""),
+        tables=_joined([part.tables for part in parts], sizes, 0),
     )
 
 
@@ -463,23 +472,16 @@ def _padded_targets(parts: Sequence[Measurements]) -> Floats:
     return np.concatenate(padded)
 
 
-def _joined(values: Sequence[tuple[Floats | None, tuple[int, ...]]]) -> Floats | None:
-    if all(value is None for value, _ in values):
+def _joined(
+    values: Sequence[NDArray[Any] | None], sizes: Sequence[int], missing: float | str = np.nan
+) -> NDArray[Any] | None:
+    """A field of all parts, in order, `missing` in the rows of those that lack it; None where all do."""
+    row = next((value.shape[1:] for value in values if value is not None), None)
+    if row is None:
         return None
-    return np.concatenate([np.full(shape, np.nan) if value is None else value for value, shape in values])
-
-
-def _joined_words(values: Sequence[tuple[Texts | None, int]]) -> Texts | None:
-    if all(value is None for value, _ in values):
-        return None
-    return np.concatenate([np.full(count, "") if value is None else value for value, count in values])
-
-
-def _joined_tables(parts: Sequence[Measurements]) -> NDArray[np.int64] | None:
-    if all(part.tables is None for part in parts):
-        return None
+    given = zip(values, sizes, strict=True)
     return np.concatenate(
-        [np.zeros(len(part), dtype=np.int64) if part.tables is None else part.tables for part in parts]
+        [np.full((size, *row), missing) if value is None else value for value, size in given]
     )
 
 

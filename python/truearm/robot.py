@@ -19,6 +19,7 @@ from truearm.description.robot_table import table_fields
 from truearm.description.urdf import UrdfChain, read_urdf, urdf_chain
 from truearm.errors import InputError
 from truearm.files import is_file, read_text
+from truearm.units import MRAD_PER_RAD
 
 URDF_ENDINGS: Final = (".urdf", ".xml")
 TABLE_ENDINGS: Final = (".csv", ".tsv", ".txt", ".xlsx")
@@ -164,7 +165,7 @@ class Robot(RobotData):
     def from_urdf_text(
         cls, text: str, base_link: str | None = None, tip_link: str | None = None, *, where: str = "URDF"
     ) -> "Robot":
-        """The same from the text of a URDF; `where` names it in messages.
+        """A robot from the chain of a URDF that is given as text; `where` names it in messages.
 
         Raises:
             InputError: As :meth:`from_urdf`.
@@ -286,18 +287,19 @@ class Robot(RobotData):
 
     def values_of(self, readings: Floats) -> Floats:
         """Joint values (n, N) of readings (n, N) that were checked."""
-        return readings if self._uncoupled else np.ascontiguousarray(readings @ self.coupling.T)
+        return np.ascontiguousarray(readings @ self.coupling.T) if self.is_coupled else readings
 
     @cached_property
-    def _uncoupled(self) -> bool:
-        return bool(np.array_equal(self.coupling, np.eye(self.joint_count)))
+    def is_coupled(self) -> bool:
+        """Whether joint values are other than the readings, if only in their direction."""
+        return not np.array_equal(self.coupling, np.eye(self.joint_count))
 
 
 def _source(chain: UrdfChain, where: str) -> str:
     ends = f"{where}, {chain.names.base_link} to {chain.names.tip_link}"
     if not chain.rounded_rad:
         return ends
-    return f"{ends}; its right angles are rounded, by up to {1e3 * chain.rounded_rad:.2g} mrad"
+    return f"{ends}; its right angles are rounded, by up to {MRAD_PER_RAD * chain.rounded_rad:.2g} mrad"
 
 
 def _target(out: Floats | None, *shape: int, single: bool) -> Floats | None:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from typing import TYPE_CHECKING, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar, get_args
 
 if TYPE_CHECKING:
     import numpy as np
@@ -12,11 +12,13 @@ LengthUnit = Literal["m", "mm"]
 StatedLengthUnit = Literal["in", "m", "mm"]
 AngleUnit = Literal["rad", "deg"]
 
-LENGTH_UNITS: Final = ("m", "mm")
-STATED_LENGTH_UNITS: Final = ("in", *LENGTH_UNITS)
+LENGTH_UNITS: Final = get_args(LengthUnit)
+STATED_LENGTH_UNITS: Final = get_args(StatedLengthUnit)
 """What a table that is brought in may be in."""
-ANGLE_UNITS: Final = ("rad", "deg")
+ANGLE_UNITS: Final = get_args(AngleUnit)
 RADIANS_PER_DEGREE: Final = math.pi / 180.0
+FULL_TURN: Final = 2.0 * math.pi
+"""In radians."""
 MM_PER_METRE: Final = 1e3
 MRAD_PER_RAD: Final = 1e3
 MM_PER_INCH: Final = 25.4

@@ -48,7 +48,7 @@ def has_ur_structure(robot: Robot) -> bool:
 
     Axes 2, 3 and 4 are parallel; 1 meets 2, 4 meets 5 and 5 meets 6 at a right angle.
     """
-    if robot.joints != ("revolute",) * len(LINKS) or not np.array_equal(robot.coupling, np.eye(len(LINKS))):
+    if robot.joints != ("revolute",) * len(LINKS) or robot.is_coupled:
         return False
     axes, _ = axes_at_zero(robot)
     pairs = zip(pairwise(axes), PARALLEL, strict=True)

@@ -74,7 +74,7 @@ class LineRobot(Managed):
         units = {"revolute": settings.angle_unit, "prismatic": settings.length_unit}
         self._si = np.array([to_si(1.0, units[kind]) for kind in arm.joints])
         turned, slid = to_si(settings.tolerance_deg, "deg"), to_si(settings.tolerance_mm, "mm")
-        self._tolerance = np.array([turned if kind == "revolute" else slid for kind in arm.joints])
+        self._tolerance = np.where(arm.revolute, turned, slid)
         self._port = LinePort.of(self.name, settings, terminator=settings.terminator)
         self._busy = threading.RLock()
         self._refusal = ""

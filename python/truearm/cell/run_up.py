@@ -30,7 +30,7 @@ class RunUp:
     def away(self) -> Floats:
         """How far each joint (N,) starts from a pose, rad and m."""
         turned, slid = to_si(self.approach_deg, "deg"), to_si(self.approach_mm, "mm")
-        return np.array([turned if kind == "revolute" else slid for kind in self.arm.joints])
+        return np.where(self.arm.revolute, turned, slid)
 
     def beside(self, readings: Floats, side: int | Floats) -> Floats:
         """Where joints start that are to come to readings from one side, within the limits.

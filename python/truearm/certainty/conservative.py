@@ -105,8 +105,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot
     plan = {
-        "angles": [joint == "revolute" for joint in robot.joints]
-        + [False] * len(calibration.options.features),
+        "angles": robot.revolute.tolist() + [False] * len(calibration.options.features),
         "ranges": _input_ranges(robot, reach.limits),
         "together": list(range(min(TOGETHER, robot.joint_count))),
         "largest": largest.tolist(),

@@ -20,6 +20,7 @@ from truearm.fits.fitting import (
 )
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import CONSTANT
+from truearm.fits.parameters import are_lengths
 from truearm.revision import Carried
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LENGTHS: Final = (1, 2)
-"""Places of d and a among a link's parameters."""
 AXES: Final = 3
 AT_ONCE: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""
@@ -135,7 +134,7 @@ class ConstantSpread:
         columns = task_of(calibration).columns(calibration.constant.names)
         length, angle, scaled = calibration.options.prior
         scale = calibration.constant.prior_scale if scaled else 1.0
-        before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
+        before = scale * np.where(are_lengths(columns), length, angle)
         details = calibration.constant
         place = SetupPlace.of(task_of(calibration), calibration.measured)
         noises = details.noise_m, details.noise_rad

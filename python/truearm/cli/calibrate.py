@@ -18,12 +18,14 @@ from truearm.cli.arguments import (
 from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
-from truearm.cli.progress import Stages, told_stages
-from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
+from truearm.cli.progress import told_stages
+from truearm.cli.report import make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
 from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, remove, write_whole
 from truearm.fits.scheme_options import SchemeOptions
+from truearm.result_names import CALIBRATION_NAME, REPORT_NAME, SUMMARY_NAME
+from truearm.stages import Stages
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from truearm.robot import Robot
 
 SCHEME = SchemeOptions()
-SUMMARY_NAME = "summary.json"
 PREVIOUS_NAME = "calibration.previous.calib"
 
 

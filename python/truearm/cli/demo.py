@@ -16,9 +16,9 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, war
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
-from truearm.cli.report import CALIBRATION_NAME
 from truearm.errors import typed
 from truearm.files import make_directory, write_whole
+from truearm.result_names import CALIBRATION_NAME
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration

@@ -1,12 +1,9 @@
 """Tables of errors, as calibrate, evaluate and demo print them."""
 
 from collections.abc import Mapping
-from typing import Final
 
 from truearm.cli.console import print_table
-from truearm.judgement.validation import Errors, Statistics
-
-HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
+from truearm.judgement.validation import HEADINGS, Errors, Statistics
 
 
 def print_errors(errors: Mapping[str, Errors], judged: str, of: str = "position") -> None:

@@ -11,6 +11,7 @@ from truearm.cli.console import FAILED, print_json, print_table, say, say_wrappe
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import typed
+from truearm.result_names import CALIBRATION_NAME
 
 if TYPE_CHECKING:
     from truearm.fleet import Fleet, FleetRun
@@ -82,7 +83,7 @@ def _print(run: "FleetRun", output: Path, *, again: str) -> None:
     if run.failed:
         suggest(again, when="Finished arms are kept. When the others are put right:")
         return
-    first = output / run.arms[0].row["arm"] / "calibration.calib"
+    first = output / run.arms[0].row["arm"] / CALIBRATION_NAME
     suggest(f"truearm report {typed(first)}", when="Look into one:")
 
 

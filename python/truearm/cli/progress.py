@@ -3,14 +3,13 @@
 import re
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import Final
 
 from truearm.cli.console import on_terminal
 from truearm.cli.display import DISPLAY, Counted, Expected, Work
 from truearm.cli.durations import Took, remember, remembered
-
-Stages = Callable[[str], AbstractContextManager[None]]
+from truearm.stages import Stages
 
 ONE_OF: Final = re.compile(r"(?P<what>.*?)(?P<number>\d+) of (?P<total>\d+)(?: that are left)?")
 

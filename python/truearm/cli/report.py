@@ -12,14 +12,13 @@ from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
 from truearm.errors import UsageError, typed
 from truearm.files import check_output, write_whole
+from truearm.result_names import CALIBRATION_NAME, REPORT_NAME
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
     from truearm.evaluation import Evaluation
     from truearm.reporting.report import Report
 
-CALIBRATION_NAME: Final = "calibration.calib"
-REPORT_NAME: Final = "report.html"
 PAGE: Final = ".html"
 PRINT: Final = ".pdf"
 

@@ -60,7 +60,7 @@ def _print_transform(label: str, transform: np.ndarray[tuple[int, ...], np.dtype
 
 
 def _print_coupling(robot: Robot) -> None:
-    if np.array_equal(robot.coupling, np.eye(robot.joint_count)):
+    if not robot.is_coupled:
         return
     say("coupling: joint values from readings, directions included")
     for row in robot.coupling:

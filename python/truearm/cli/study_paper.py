@@ -10,10 +10,10 @@ from truearm.cli.calibrate import check_directory
 from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
+from truearm.defaults import PAPER_FIGURES
 from truearm.errors import UsageError, typed
 from truearm.files import make_directory, write_whole
 
-FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
 JSON_NAME: Final = "paper.json"
 PAGE_NAME: Final = "paper.md"
 
@@ -22,7 +22,7 @@ def command(
     output: OutputDirectory,
     figure: Annotated[
         list[str] | None,
-        typer.Option(metavar="|".join(FIGURES), help="One of them; may be repeated.  [default: all]"),
+        typer.Option(metavar="|".join(PAPER_FIGURES), help="One of them; may be repeated.  [default: all]"),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many virtual arms.")] = 20,
     scheduler: Scheduler = None,
@@ -42,11 +42,11 @@ def command(
       truearm study paper -o study
       truearm study paper -o study --scheduler tcp://10.0.0.5:8786
     """
-    chosen = tuple(figure) if figure else FIGURES
+    chosen = tuple(figure) if figure else PAPER_FIGURES
     for name in chosen:
-        if name not in FIGURES:
+        if name not in PAPER_FIGURES:
             raise UsageError(
-                f'there is no figure "{name}"', where="--figure", rule=f"Of {', '.join(FIGURES)}"
+                f'there is no figure "{name}"', where="--figure", rule=f"Of {', '.join(PAPER_FIGURES)}"
             )
     check_directory(output)
     from truearm.studies.paper_results import conduct_study, save_pictures

@@ -14,9 +14,9 @@ from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
-from truearm.cli.report import CALIBRATION_NAME
 from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError, typed
+from truearm.result_names import CALIBRATION_NAME
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration

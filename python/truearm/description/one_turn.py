@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.description.robot_data import RobotData
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 
-TURN: Final = 2.0 * np.pi
 OPEN_WAY_M: Final = 1.0
 """Of a joint that slides without limits."""
 
@@ -21,8 +21,8 @@ def one_turn(robot: RobotData) -> tuple[Floats, Floats]:
     to zero: readings a turn apart are taken to err alike, and a joint may have its zero anywhere.
     """
     low, high = robot.limits.T
-    turns = np.array([kind == "revolute" for kind in robot.joints])
-    widest = np.where(turns, TURN, np.where(np.isfinite(robot.limits).all(axis=1), np.inf, OPEN_WAY_M))
+    slid = np.where(np.isfinite(robot.limits).all(axis=1), np.inf, OPEN_WAY_M)
+    widest = np.where(robot.revolute, FULL_TURN, slid)
     part = np.where(np.isfinite(widest), widest, 0.0)
     begun = np.minimum(np.maximum(-0.5 * part, low), high - part)
     wide = high - low > widest

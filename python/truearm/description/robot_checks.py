@@ -6,12 +6,12 @@ import numpy as np
 
 from truearm.description.robot_data import RobotData
 from truearm.errors import InputError, Notice, list_rows
-from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
 
 MAX_LENGTH_M: Final = 50.0
 NO_LONGER: Final = f"No link is longer than {MAX_LENGTH_M:g} m"
 SHORTEST_ARM_M: Final = 0.02
-MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
+MAX_ANGLE_RAD: Final = FULL_TURN + 1e-6
 MAX_LIMIT_RAD: Final = 40.0 * np.pi
 STRANGE_LIMIT_RAD: Final = 4.0 * np.pi
 """Beyond two turns either way a limit that is a whole number of radians was meant in degrees."""
@@ -61,16 +61,15 @@ def robot_notices(robot: RobotData) -> list[Notice]:
 
 def _limits_in_degrees(robot: RobotData) -> list[Notice]:
     """A notice of revolute joints whose limits, in rad, are whole numbers beyond two turns."""
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
     limits = np.where(np.isfinite(robot.limits), np.abs(robot.limits), 0.0)
     whole = np.abs(limits - np.round(limits)) < WHOLE_TOLERANCE
-    strange = revolute & ((limits > STRANGE_LIMIT_RAD) & whole).any(axis=1)
+    strange = robot.revolute & ((limits > STRANGE_LIMIT_RAD) & whole).any(axis=1)
     if not strange.any():
         return []
     links = (np.flatnonzero(strange) + 1).tolist()
     most = float(limits[strange].max())
     text = (
-        f"A limit of {most:g} rad, {most / (2.0 * np.pi):.1f} turns, in {list_rows(links, 'link')} looks "
+        f"A limit of {most:g} rad, {most / FULL_TURN:.1f} turns, in {list_rows(links, 'link')} looks "
         "like degrees: the arm may be asked for readings that it cannot reach."
     )
     return [Notice("limits_as_radians", text, tuple(links))]

@@ -75,6 +75,17 @@ class RobotData:
         """Number of joints, N."""
         return len(self.joints)
 
+    @property
+    def revolute(self) -> NDArray[np.bool_]:
+        """Which joints turn (N,); the others slide."""
+        return np.array([kind == "revolute" for kind in self.joints])
+
+    def finite_limits(self, open_m: float) -> tuple[Floats, Floats]:
+        """Lowest and highest readings (N,); where there is no limit, half a turn or `open_m` from zero."""
+        reach = np.where(self.revolute, np.pi, open_m)
+        low, high = self.limits.T
+        return np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+
 
 def _check_known(field: str, values: Sequence[str], known: tuple[str, ...]) -> None:
     for value in values:

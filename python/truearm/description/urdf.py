@@ -65,7 +65,7 @@ def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = N
 
 
 def urdf_chain(text: str, base_link: str | None, tip_link: str | None, *, where: str) -> UrdfChain:
-    """The same of the text of a URDF; `where` names it in messages.
+    """The chain of a URDF that is given as text; `where` names it in messages.
 
     Raises:
         InputError: As :func:`read_urdf`.

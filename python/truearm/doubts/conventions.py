@@ -230,7 +230,7 @@ def _words_of_others(robot: Robot, others: list[Convention]) -> str:
 
 def _some_rows(task: Task, data: Measurements, target: int) -> Measurements:
     """Some rows of the set-up with the most, with points that were measured."""
-    seen = np.isfinite(data.targets[:, target]).all(axis=1)
+    seen = data.seen(target)
     groups = [np.flatnonzero(seen & (data.group == group)) for group in task.groups]
     return data.select(some_rows(max(groups, key=len)))
 

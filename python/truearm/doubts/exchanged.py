@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from truearm.doubts.of_results import ROWS_EXCHANGED, TARGETS_EXCHANGED
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
-from truearm.fits.fitting import Task, fit_rows, no_stages
+from truearm.fits.fitting import Task, fit_rows
 from truearm.fits.models import CONSTANT, ArmModel
 from truearm.lengths import length_mm
 from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
+from truearm.stages import no_stages
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:

@@ -101,7 +101,7 @@ class Expected:
         Its standard deviation there, what it leaves unexplained, and the row's own sigma. Where it does not
         know the first, the bound of it; where there is none either, the others alone.
         """
-        own = np.zeros(len(rows)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m[rows])
+        own = self.data.stated_sigma_m[rows]
         noise = noise_mm(self.calibration) / MM_PER_METRE
         squares = AXES * (noise**2 + own**2)
         kinds, kind = np.unique(self.tools[rows], axis=0, return_inverse=True)

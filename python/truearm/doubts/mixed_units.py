@@ -9,7 +9,7 @@ from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.robot import Robot
-from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -96,7 +96,7 @@ def _check_readings(own: Measurements, robot: Robot) -> None:
     """Rows in radians, as no other is, where the columns of joints are stated to be in degrees."""
     degrees = np.array(own.joint_units) == "deg"
     written = own.readings / RADIANS_PER_DEGREE
-    odd = degrees.any() & (np.abs(written[:, degrees]) <= 2.0 * np.pi).all(axis=1)
+    odd = degrees.any() & (np.abs(written[:, degrees]) <= FULL_TURN).all(axis=1)
     points = own.targets[:, own.most_held()]
     if not odd.any() or np.isfinite(points[~odd, 0]).sum() < FEWEST or odd.mean() >= 0.5:
         return

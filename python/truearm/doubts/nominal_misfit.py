@@ -52,7 +52,7 @@ class Seen:
         if data.target_count == 0:
             return None
         target = data.most_held()
-        held = np.isfinite(data.targets[:, target]).all(axis=1) & (data.group == data.groups[0])
+        held = data.seen(target) & (data.group == data.groups[0])
         rows = np.flatnonzero(held)
         return cls.of(data, target).select(some_rows(rows)) if len(rows) >= FEWEST_ROWS else None
 

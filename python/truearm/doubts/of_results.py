@@ -170,7 +170,7 @@ def stated_too_large(
     """
     if data.sigma_m is None:
         return []
-    stated = float(np.median(np.nan_to_num(data.sigma_m))) * MM_PER_METRE
+    stated = float(np.median(data.stated_sigma_m)) * MM_PER_METRE
     left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=held is None)
     if left > UNLIKELY * noise:
         return [] if held is None else _level_too_large(held.sigmas_mm(data), held, best)
@@ -259,7 +259,7 @@ def orientations_left_out(data: Measurements, selection: Selection, use: str | N
     """A warning where orientations were measured and several targets are fitted in their place."""
     if use is not None or selection.orientation or data.orientations is None:
         return []
-    count = int(np.isfinite(data.orientations).all(axis=1).sum())
+    count = int(data.oriented.sum())
     if not count:
         return []
     text = (

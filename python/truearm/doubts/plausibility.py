@@ -15,7 +15,7 @@ from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
-from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -143,8 +143,7 @@ def _check_kinds(measurements: Measurements, robot: Robot) -> None:
 
 
 def _check_strokes(measurements: Measurements, robot: Robot) -> None:
-    prismatic = np.array([kind == "prismatic" for kind in robot.joints])
-    unstated: Mask = prismatic & np.isin(np.array(measurements.joint_units), ("", "m"))
+    unstated: Mask = ~robot.revolute & np.isin(np.array(measurements.joint_units), ("", "m"))
     readings = measurements.readings
     outside: Mask = np.asarray((outside_limits(readings, robot.limits) & unstated).any(axis=1))
     as_millimetres = np.where(unstated, readings / MM_PER_METRE, readings)
@@ -165,7 +164,7 @@ def _check_slides(measurements: Measurements, robot: Robot) -> None:
 
     Slides that hardly moved are as short: the nominal arm tells which of both they are.
     """
-    slides = np.array([kind == "prismatic" for kind in robot.joints])
+    slides = ~robot.revolute
     readings, (low, high) = measurements.readings, robot.limits.T
     span, times = np.ptp(readings, axis=0), np.where(slides, MM_PER_METRE, 1.0)
     short = slides & np.isfinite(high - low) & (span > 0.0) & (span * SPREAD_FACTOR < high - low)
@@ -326,7 +325,7 @@ def _way_out_of_large(measured: float, nominal: float, columns: str = "x_mm, y_m
 def _could_be_radians(group: Measurements, robot: Robot) -> bool:
     degrees = np.array(group.joint_units) == "deg"
     values = group.readings[:, degrees] / RADIANS_PER_DEGREE
-    return bool(degrees.any()) and bool((np.abs(values) <= 2.0 * np.pi).all())
+    return bool(degrees.any()) and bool((np.abs(values) <= FULL_TURN).all())
 
 
 def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:

@@ -74,11 +74,7 @@ def _words(data: Measurements) -> list[list[str]]:
 
 def _seen(data: Measurements) -> Mask:
     """Which targets each row holds, and whether an orientation (n, T + 1)."""
-    points: Mask = np.asarray(np.isfinite(data.targets).all(axis=2))
-    turned = np.zeros(len(data), dtype=np.bool_)
-    if data.orientations is not None:
-        turned = np.asarray(np.isfinite(data.orientations).all(axis=1))
-    return np.column_stack([points, turned])
+    return np.column_stack([data.seen(), data.oriented])
 
 
 def _gathered(values: NDArray[np.float64], number: Rows) -> NDArray[np.float64]:

@@ -33,12 +33,11 @@ def rounded_notices(robot: Robot, readings: Floats, noise_mm: float) -> list[Not
         readings: Readings (n, N), rad and m.
         noise_mm: Standard deviation of a coordinate's noise.
     """
-    turning = np.array([kind == "revolute" for kind in robot.joints])
-    step = _step(readings[:, turning])
+    step = _step(readings[:, robot.revolute])
     if step is None:
         return []
     some = np.ascontiguousarray(readings[:: 1 + len(readings) // MOST_ROWS])
-    squares = np.square(robot.joint_jacobian(some)[:, :, turning]).sum(axis=2)
+    squares = np.square(robot.joint_jacobian(some)[:, :, robot.revolute]).sum(axis=2)
     left_mm = MM_PER_METRE * to_si(*step) * float(np.sqrt(squares.mean() / 12.0))
     least, most = GOOD_PART
     if not least * noise_mm <= left_mm <= most * noise_mm:

@@ -48,7 +48,7 @@ class _Rows:
     @property
     def seen(self) -> Rows:
         """Rows with a measured point."""
-        return np.flatnonzero(np.isfinite(self.data.targets[:, self.target]).all(axis=1))
+        return np.flatnonzero(self.data.seen(self.target))
 
     def has_partner(self, rows: Rows, lag: int | Rows) -> NDArray[np.bool_]:
         """Whether there are readings so many rows further on (m,)."""

@@ -48,8 +48,7 @@ def check_degrees(measurements: Measurements, robot: Robot) -> None:
     Raises:
         InputError: If they look like degrees.
     """
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
-    unstated = revolute & (np.array(measurements.joint_units) == "")
+    unstated = robot.revolute & (np.array(measurements.joint_units) == "")
     readings = measurements.readings
     outside = outside_limits(readings, robot.limits) & unstated
     far = outside & (np.abs(readings) > MAX_READING_RAD)
@@ -84,7 +83,7 @@ def check_angles(measurements: Measurements, robot: Robot) -> None:
         InputError: If the nominal arm, its frame and target fitted, is far from them with the readings as
             they are, and near with all of them divided, or multiplied, by the degrees of a radian.
     """
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    revolute = robot.revolute
     unstated = revolute & (np.array(measurements.joint_units) == "")
     if not revolute.any() or _misfit(measurements, robot) <= MISFIT:
         return

@@ -106,6 +106,6 @@ def _scattering(fitted: FittedRows, seen: Whitened, name: str, own: Mask) -> Sca
     taken_for = np.sqrt(np.square(np.linalg.inv(seen.root[own])).sum(axis=2)[held])
     error = ERROR_OF_MEDIAN / np.sqrt(AXES * len(held))
     data = fitted.data.select(seen.rows[own])
-    stated = 0.0 if data.sigma_m is None else float(np.median(np.nan_to_num(data.sigma_m)))
+    stated = float(np.median(data.stated_sigma_m))
     mm = MM_PER_METRE * deviation * float(np.median(taken_for))
     return Scattering(name, deviation, mm, float(error), MM_PER_METRE * stated)

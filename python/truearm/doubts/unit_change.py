@@ -35,7 +35,7 @@ def check_one_unit(measurements: Measurements, robot: Robot) -> None:
     """
     for group in measurements.groups if measurements.target_count else []:
         own = measurements.select(measurements.group == group)
-        seen = np.flatnonzero(np.isfinite(own.targets[:, 0]).all(axis=1))
+        seen = np.flatnonzero(own.seen(0))
         points = own.targets[seen, 0]
         first = _first_behind(np.linalg.norm(points, axis=1))
         units = None

@@ -68,10 +68,9 @@ class Whitened:
         rows, residual, held = _visits(fitted, found.selection, progress)
         data = fitted.fitted.select(rows)
         inputs, arm, setup, joints = _derivatives(found, data, held)
-        sigma = np.zeros(len(data)) if data.sigma_m is None else np.nan_to_num(data.sigma_m)
         size = held.shape[1]
         noise = found.spread.noise(arm, np.zeros(size, dtype=np.bool_))
-        noise = noise + np.square(sigma)[:, None, None] * np.eye(size)
+        noise = noise + np.square(data.stated_sigma_m)[:, None, None] * np.eye(size)
         noise = np.where(held[:, :, None] & held[:, None], noise, np.eye(size))
         root = np.linalg.cholesky(np.linalg.inv(noise)).transpose(0, 2, 1)
         known = found.spread.joint(inputs, arm, setup) / _widened(found) ** 2

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.calibration import Calibration
 from truearm.errors import UsageError, WorkError
 from truearm.exporting.losses import LINK_ORDER, as_comments
-from truearm.exporting.parity import UNLIMITED, flange_poses
+from truearm.exporting.parity import OPEN_REACH_M, flange_poses
 from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
@@ -237,9 +237,7 @@ def _ranges(calibration: Calibration) -> list[tuple[float, float]]:
         q = calibration.learned_from.data.readings
         low, high = q.min(axis=0), q.max(axis=0)
     else:
-        reach = np.array([UNLIMITED[kind] for kind in robot.joints])
-        low = np.where(np.isfinite(robot.limits[:, 0]), robot.limits[:, 0], -reach)
-        high = np.where(np.isfinite(robot.limits[:, 1]), robot.limits[:, 1], reach)
+        low, high = robot.finite_limits(OPEN_REACH_M)
     scale = np.array([1.0 / to_si(1.0, DISPLAYED[kind]) for kind in robot.joints])
     return list(zip((low * scale).tolist(), (high * scale).tolist(), strict=True))
 

@@ -14,14 +14,12 @@ Poses = Callable[[Floats], Floats]
 
 WITHIN_M: Final = 1e-9
 POSES: Final = 200
-UNLIMITED: Final = {"revolute": np.pi, "prismatic": 1.0}
+OPEN_REACH_M: Final = 1.0
 
 
 def largest_difference(robot: Robot, first: Poses, second: Poses) -> float:
     """Largest difference of two models' poses at readings drawn over the limits: m, or rad times a metre."""
-    reach = np.array([UNLIMITED[kind] for kind in robot.joints])
-    low, high = robot.limits.T
-    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    low, high = robot.finite_limits(OPEN_REACH_M)
     q = np.random.default_rng(0).uniform(low, high, (POSES, robot.joint_count))
     return float(np.abs(first(q) - second(q)).max())
 

@@ -76,6 +76,6 @@ def _frame_notes(robot: Robot) -> list[str]:
         transform = getattr(robot, name)
         if not np.array_equal(transform, np.eye(4)):
             notes.append(f"The fixed transform {name} is {transform.tolist()}")
-    if not np.array_equal(robot.coupling, np.eye(robot.joint_count)):
+    if robot.is_coupled:
         notes.append(f"Joint values are q_dh = C q of the readings q, C = {robot.coupling.tolist()}")
     return notes

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Use = Literal["position", "pose", "targets"]
 
-USES: Final = ("position", "pose", "targets")
+USES: Final = get_args(Use)
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET
     judge = first if judge_target == FIRST_TARGET else judge_target - 1
     others = tuple(target for target in further if target != judge)
     if use is None:
-        use = "targets" if others else "pose" if _measures_orientation(data) else "position"
+        use = "targets" if others else "pose" if data.oriented.any() else "position"
     return Selection((first, *(others if use == "targets" else ())), orientation=use == "pose", judge=judge)
 
 
@@ -97,8 +97,7 @@ def first_measured(data: Measurements, selection: Selection) -> Rows:
 
     It is where the row's error is told; 0 where none was measured.
     """
-    seen = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2)
-    return np.asarray(seen.argmax(axis=1))
+    return np.asarray(data.seen(selection.targets).argmax(axis=1))
 
 
 def core_set(
@@ -119,14 +118,13 @@ def core_set(
     """
     count = len(data)
     number = {name: k for k, name in enumerate(groups)}
-    sigma = np.zeros(count) if data.sigma_m is None else np.nan_to_num(data.sigma_m, nan=0.0)
     return MeasurementSet(
         {
             "joints": robot.joints_from_readings(data.readings),
             "group": np.array([number[name] for name in data.group], dtype=np.int64),
             "targets": np.ascontiguousarray(data.targets[:, list(selection.targets)]),
             "rotations": rotations(data) if selection.orientation else None,
-            "sigma": sigma,
+            "sigma": data.stated_sigma_m,
             "weight": np.ones(count) if weight is None else weight,
             "distances": _distances(data) if selection.distances else [],
         }
@@ -173,7 +171,7 @@ def rotations(data: Measurements) -> Floats:
     """world_from_target rotations (n, 3, 3); NaN where not measured."""
     found = np.full((len(data), 3, 3), np.nan)
     if data.orientations is not None:
-        measured = np.isfinite(data.orientations).all(axis=1)
+        measured = data.oriented
         found[measured] = matrix_from_quaternion(data.orientations[measured])
     return found
 
@@ -233,7 +231,7 @@ def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None
     where = ", ".join(data.files)
     if use is not None and use not in USES:
         raise UsageError(f'"{use}" is not known', where="use", rule="Either position, pose or targets")
-    if use == "pose" and not _measures_orientation(data):
+    if use == "pose" and not data.oriented.any():
         raise UsageError(
             "no orientation was measured", where=where, rule="A pose needs the columns qw qx qy qz"
         )
@@ -251,10 +249,4 @@ def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None
 
 def _measured_targets(data: Measurements) -> list[int]:
     """The points that some row holds, indices from 0."""
-    held = np.isfinite(data.targets).all(axis=2).any(axis=0)
-    return [int(point) for point in np.flatnonzero(held)]
-
-
-def _measures_orientation(data: Measurements) -> bool:
-    """Whether some row holds an orientation."""
-    return data.orientations is not None and bool(np.isfinite(data.orientations).all(axis=1).any())
+    return [int(point) for point in np.flatnonzero(data.seen().any(axis=0))]

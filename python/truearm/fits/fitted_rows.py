@@ -80,8 +80,7 @@ class FittedRows:
         """How far each row (n,) is turned from how the model has it; NaN where orientation was not fitted."""
         if not self.orientation or self.data.orientations is None:
             return np.full(len(self.side), np.nan)
-        measured = np.isfinite(self.data.orientations).all(axis=1)
-        return np.where(measured, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)
+        return np.where(self.data.oriented, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)
 
     @property
     def fitted(self) -> Measurements:

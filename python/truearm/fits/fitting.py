@@ -1,8 +1,8 @@
 """The three fits of one set of rows: frame and tool alone, constants, and what varies."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -31,10 +31,10 @@ from truearm.inputs import is_payload
 from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_pose
+from truearm.stages import Stages, no_stages
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
-Stages = Callable[[str], AbstractContextManager[Any]]
 
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
@@ -47,16 +47,11 @@ SUSPECTED: Final = 1e-4
 CLEARER: Final = 0.7
 """Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
 PROMISING: Final = 0.85
-"""The same ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
+"""That ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
 """Share of all squares that constants leave from which rows that are taken out have bent them."""
-
-
-def no_stages(_: str) -> AbstractContextManager[None]:
-    """Says nothing about the stages of the work."""
-    return nullcontext()
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +156,8 @@ class Fits:
 def constant_variances(fits: Fits, selection: Selection) -> Floats:
     """Variances (n, m) that the constant fit took for what its rows hold, those of distances (n, 1)."""
     position, orientation = fits.constant.noise
-    own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
     width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
-    variance = np.repeat((position**2 + own**2)[:, None], width, axis=1)
+    variance = np.repeat((position**2 + fits.data.stated_sigma_m**2)[:, None], width, axis=1)
     if selection.orientation:
         variance[:, -3:] = orientation**2
     return variance
@@ -304,6 +298,18 @@ def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data:
     joints, seed = task.arm.robot.joints, task.options.split.seed
     rows = SchemeRows(task.problem(measured, columns), columns, constant, values, joints, seed)
     return fit_scheme(task.options.model, rows, task.options.scheme)
+
+
+def fit_setup(task: Task, data: Measurements, parameters: Floats, robust: str | None = None) -> ConstantFit:
+    """Frames and targets alone of the set-ups of a task, with the arm's `parameters` (n, L, 5) as they are.
+
+    Raises:
+        WorkError: If the rows determine too little.
+    """
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    options = fit_options(task.threads, robust=robust, parameters=parameters)
+    with core_errors(data):
+        return fit_constant(task.problem(measured, []), options)
 
 
 def fit_options(

@@ -44,7 +44,7 @@ class Identifiability:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Identifiability":
-        """The same from JSON values."""
+        """One from the JSON values of `to_dict`."""
         texts = {key: tuple(content[key]) for key in ("determined", "undetermined", "words")}
         return cls(
             parameters=content["parameters"],

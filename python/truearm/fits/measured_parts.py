@@ -123,8 +123,4 @@ def sureness(own_m: Floats, left_m: float, weight: Floats) -> Floats:
 
 def held_parts(data: Measurements, selection: Selection) -> Mask:
     """Which of the fitted targets each row holds, and whether an orientation that was fitted (n, t + 1)."""
-    points = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2)
-    turned = np.zeros(len(data), dtype=np.bool_)
-    if selection.orientation and data.orientations is not None:
-        turned = np.asarray(np.isfinite(data.orientations).all(axis=1))
-    return np.column_stack([points, turned])
+    return np.column_stack([data.seen(selection.targets), data.oriented & selection.orientation])

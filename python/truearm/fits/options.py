@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from truearm import kinds
-from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, MODEL, NO_DRIFT, ROBUST
+from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, MODEL, ROBUST
 from truearm.errors import UsageError, list_names
 from truearm.fits.core_set import USES, Use
 from truearm.fits.identified import Frame
 from truearm.fits.parameters import PARALLEL_WITHIN_DEG
 from truearm.fits.scheme_options import SchemeOptions
-from truearm.fits.schemes import FCMAC, NETWORKS, SCHEMES
+from truearm.fits.schemes import FCMAC, NETWORKS
 from truearm.rows.splitting import SplitRule
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
 Robust = Literal["none", "huber", "cauchy"]
@@ -20,10 +21,10 @@ Drifting = Literal["auto", "none"]
 
 CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "use": (None, *USES),
-    "model": ("variable", "constant", *SCHEMES),
-    "robust": ("none", "huber", "cauchy"),
-    "drift": ("auto", NO_DRIFT),
-    "frame": ("free", "world"),
+    "model": get_args(ModelName),
+    "robust": get_args(Robust),
+    "drift": get_args(Drifting),
+    "frame": get_args(Frame),
     "degree": (2, 3),
 }
 POSITIVE: Final = ("prior_mm", "prior_mrad", "parallel_within_deg", "repeatability_mm")
@@ -90,7 +91,7 @@ class Options:
     @property
     def prior(self) -> tuple[float, float, bool]:
         """Standard deviations of lengths (m) and angles (rad), and that the evidence scales them."""
-        return self.prior_mm / 1e3, self.prior_mrad / 1e3, True
+        return self.prior_mm / MM_PER_METRE, self.prior_mrad / MRAD_PER_RAD, True
 
     @classmethod
     def of(cls, **given: Any) -> "Options":

@@ -2,9 +2,10 @@
 
 from typing import Final
 
-from truearm.calibrating import OPEN_SETUP, REFIT_ASTRAY
+from truearm.calibrating import REFIT_ASTRAY
 from truearm.calibration import Calibration
 from truearm.doubts.held_tool import never_turns_freely
+from truearm.doubts.of_calibration import OPEN_SETUP
 from truearm.doubts.of_results import COMPUTED, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, SINGLE_ROWS, WOULD_FIT
 
 GRAVE: Final = (COMPUTED, SINGLE_ROWS, *WOULD_FIT, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, REFIT_ASTRAY)

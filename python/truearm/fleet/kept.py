@@ -9,10 +9,8 @@ from truearm.files import make_directory, write_whole
 from truearm.fleet.inputs import Inputs
 from truearm.fleet.rows import Row, row_of_made
 from truearm.fleet.task import ArmMade
+from truearm.result_names import CALIBRATION_NAME, REPORT_NAME, SUMMARY_NAME
 
-CALIBRATION_NAME: Final = "calibration.calib"
-SUMMARY_NAME: Final = "summary.json"
-REPORT_NAME: Final = "report.html"
 ROW_NAME: Final = "arm.json"
 
 

@@ -9,12 +9,12 @@ from truearm.errors import count_of
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD
 from truearm.fleet.drift import SURE
 from truearm.fleet.fleet_file import Fleet
-from truearm.fleet.kept import REPORT_NAME
 from truearm.fleet.rows import Judged, counts
 from truearm.reporting.charts import axis, legend, log_axis
 from truearm.reporting.page import page
 from truearm.reporting.parts import Card, Cell, Figure, Head, Section, Table, Text, Tone
 from truearm.reporting.style import marker_of
+from truearm.result_names import REPORT_NAME
 
 TONES: Final[dict[str, Tone]] = {GOOD: "good", ATTENTION: "fair", FAILED: "bad"}
 COLUMNS: Final = (

@@ -10,14 +10,15 @@ from typing import Any, Final
 
 from truearm.errors import TruearmError
 from truearm.files import make_directory, write_whole
-from truearm.fits.fitting import Stages, no_stages
 from truearm.fleet.attention import FAILED
 from truearm.fleet.fleet_file import Entry, Fleet
 from truearm.fleet.inputs import Inputs, find_inputs
-from truearm.fleet.kept import REPORT_NAME, earlier_files, keep, kept_row
+from truearm.fleet.kept import earlier_files, keep, kept_row
 from truearm.fleet.page import fleet_page
 from truearm.fleet.rows import Judged, Row, content, counts, judged, row_of_failed, table_of
 from truearm.fleet.task import ArmTask, calibrate_arm
+from truearm.result_names import REPORT_NAME
+from truearm.stages import Stages, no_stages
 from truearm.workers import Done, check_workers, run_tasks
 
 JSON_NAME: Final = "fleet.json"

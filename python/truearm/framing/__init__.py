@@ -88,7 +88,7 @@ def find_object(
     """
     calibration, data = required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_readings(data, calibration.robot)
-    if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
+    if not data.target_count or not data.seen(0).all():
         raise InputError(
             "there is no place x, y, z of every touched point",
             where=", ".join(data.files),

@@ -47,7 +47,7 @@ class IdentifiedFrame:
         return f"<IdentifiedFrame: {self.kind} at {x:.3f} {y:.3f} {z:.3f} mm, from {self.how}>"
 
     def told_in(self, outer: Floats) -> "IdentifiedFrame":
-        """The same told in a frame (4, 4) of the base, its covariance along the axes of that frame."""
+        """The frame told in another (4, 4) of the base, its covariance along the axes of that frame."""
         inward = rigid_inverse(outer)
         turned = np.kron(np.eye(2), inward[:3, :3])
         covariance = turned @ self.covariance @ turned.T

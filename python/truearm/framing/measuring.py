@@ -3,13 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import fit_constant
 from truearm.calibration import Calibration
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import WorkError
-from truearm.fits.core_set import Selection, core_set, select
+from truearm.fits.core_set import Selection, select
 from truearm.fits.enough_values import frame_unknowns
-from truearm.fits.fitting import Task, core_errors, fit_options
+from truearm.fits.fitting import Task, fit_setup
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.identified_frame import IdentifiedFrame
@@ -43,9 +42,7 @@ def tool_from_measurements(
     _check_told(calibration, data, freedom, f"measured {noun}")
     model = calibration.model
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
-    measured = core_set(task.arm.robot, data, selection, task.groups)
-    with core_errors(data):
-        fit = fit_constant(task.problem(measured, []), fit_options(task.threads, parameters=parameters))
+    fit = fit_setup(task, data, parameters)
     residuals = np.asarray(fit.residuals).reshape(len(data), width)
     transform, covariance = np.eye(4), np.zeros((6, 6))
     transform[:3, 3] = fit.setup.targets[0, 0]

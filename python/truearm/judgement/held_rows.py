@@ -56,10 +56,8 @@ class HeldRows:
 
     def sigmas_mm(self, data: Measurements) -> Floats:
         """What each of these rows states as its sigma (n,) in the measurements it is of, mm; else zero."""
-        if data.sigma_m is None:
-            return np.zeros(len(self))
         names = zip(data.sources.tolist(), data.rows.tolist(), strict=True)
-        stated = dict(zip(names, (MM_PER_METRE * np.nan_to_num(data.sigma_m)).tolist(), strict=True))
+        stated = dict(zip(names, (MM_PER_METRE * data.stated_sigma_m).tolist(), strict=True))
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([stated.get(row, 0.0) for row in own])
 

@@ -104,7 +104,7 @@ def never_found(lost: Mask, judged: Measurements, selection: Selection) -> list[
 def holding_nothing(judged: Measurements, selection: Selection, groups: Sequence[str] = ()) -> list[Notice]:
     """A notice of judged rows that hold nothing that is judged; those of `groups` are told otherwise."""
     targets = [selection.judge] if selection.judges_another else list(selection.targets)
-    seen = np.asarray(np.isfinite(judged.targets[:, targets]).all(axis=2))
+    seen = judged.seen(targets)
     empty = ~seen.any(axis=1) & ~np.isin(judged.group, groups)
     if selection.distances or not empty.any():
         return []
@@ -141,7 +141,7 @@ def _lost(fitted: Measurements, judged: Measurements, selection: Selection) -> M
 
 def _groups_with(data: Measurements, target: int) -> set[str]:
     """The set-ups with rows that hold a target, from 0."""
-    return set(data.group[np.isfinite(data.targets[:, target]).all(axis=1)].tolist())
+    return set(data.group[data.seen(target)].tolist())
 
 
 def judge(
@@ -184,7 +184,7 @@ def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: S
     base_from_flange = task.arm.flange_chain.pose(joints, np.ascontiguousarray(parameters))
     frames = setup.frames
     points = np.full((len(task.groups), 1, 3), np.nan)
-    held = np.isfinite(data.targets[:, task.selection.judge]).all(axis=1)
+    held = data.seen(task.selection.judge)
     for number, group in enumerate(task.groups):
         rows = held & (data.group == group)
         if not rows.any():

@@ -20,10 +20,13 @@ Floats = NDArray[np.float64]
 
 MILLI = 1e-3
 FEW_HELD = 30
+STATISTICS: Final = ("mean", "rms", "p95", "p99", "max")
+HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
+"""What tables call them."""
 MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
 """Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
 MEAN_SIZE: Final = math.sqrt(2.0 / math.pi)
-"""The same of one coordinate, as of distances."""
+"""Mean absolute value of one such coordinate, as of distances."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +263,7 @@ def row_errors(
     left = residuals(problem, np.ascontiguousarray(parameters), setup)
     if selection.distances:
         return RowErrors(at_first_measured(left, data, selection))
-    seen = np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
+    seen = data.seen(selection.targets)
     if not seen.any():
         listed = " or ".join(str(target + 1) for target in selection.targets)
         raise InputError(
@@ -271,8 +274,7 @@ def row_errors(
     position = _where_seen(np.asarray(seen.any(axis=1)), at_first_measured(left, data, selection))
     if not selection.orientation or data.orientations is None:
         return RowErrors(position)
-    turned = np.isfinite(data.orientations).all(axis=1)
-    return RowErrors(position, _where_seen(np.asarray(turned), left[:, -3:]))
+    return RowErrors(position, _where_seen(data.oriented, left[:, -3:]))
 
 
 def at_first_measured(residuals: Floats, data: Measurements, selection: Selection) -> Floats:

@@ -130,7 +130,7 @@ class JointLimits:
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
-        margin = np.where(np.array(places.robot.joints) == "revolute", self.margin_rad, self.margin_m)
+        margin = np.where(places.robot.revolute, self.margin_rad, self.margin_m)
         low, high = places.robot.limits.T
         inside = (places.readings >= low + margin) & (places.readings <= high - margin)
         return np.asarray(inside.all(axis=1))

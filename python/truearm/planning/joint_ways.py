@@ -34,7 +34,7 @@ def stepped(robot: Robot, stops: Floats) -> Floats:
 
 def steps_of_way(robot: Robot, begin: Floats, end: Floats) -> int:
     """In how many steps a straight way from readings (N,) to others is looked at, one at the least."""
-    step = np.where(np.array(robot.joints) == "revolute", STEP_RAD, STEP_M)
+    step = np.where(robot.revolute, STEP_RAD, STEP_M)
     return max(1, int(np.ceil(np.abs((end - begin) / step).max())))
 
 

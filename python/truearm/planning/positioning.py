@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from truearm.planning.configurations import Configuration
 from truearm.robot import Robot
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,7 +21,7 @@ STARTS_TRIED: Final = 3
 STEPS: Final = 12
 LARGEST_STEP: Final = 0.3
 REACHED_M: Final = 1e-9
-TURN: Final = 2.0 * np.pi
+OPEN_REACH_M: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,7 @@ class PositionInverse:
             for column in self._columns
             if self.robot.joints[column] == "revolute" and not np.isfinite(self.robot.limits[column]).any()
         ]
-        readings[:, free] = (readings[:, free] + np.pi) % TURN - np.pi
+        readings[:, free] = (readings[:, free] + np.pi) % FULL_TURN - np.pi
         return readings
 
     @property
@@ -88,9 +89,7 @@ class PositionInverse:
 
     @cached_property
     def _starts(self) -> Floats:
-        low, high = self.robot.limits.T
-        reach = np.array([np.pi if kind == "revolute" else 0.5 for kind in self.robot.joints])
-        low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+        low, high = self.robot.finite_limits(OPEN_REACH_M)
         readings = np.tile(np.asarray(self.held, dtype=np.float64), (STARTS, 1))
         drawn = np.random.default_rng(0).uniform(low, high, readings.shape)
         readings[:, self._columns] = drawn[:, self._columns]

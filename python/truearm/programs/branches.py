@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from truearm._core import Chain
 from truearm.errors import InputError
 from truearm.robot import Robot
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
-FULL_TURN: Final = 2.0 * np.pi
 MEET_M: Final = 1e-6
 PARALLEL: Final = 1e-6
 

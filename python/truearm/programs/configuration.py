@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truearm.description.robot_data import RobotData
 from truearm.programs.layouts import Layout
 from truearm.programs.tables import Targets
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,7 +22,6 @@ Bools = NDArray[np.bool_]
 ANY: Final = -(2**31)
 EDGE_RAD: Final = np.deg2rad(0.01)
 """A text's numbers are rounded: so near to a digit's edge, a joint may have been on the other side of it."""
-FULL_TURN: Final = 2.0 * np.pi
 
 
 class Configuration(Protocol):
@@ -124,8 +124,7 @@ class NearestTurns:
 
 def _turning(robot: RobotData) -> Bools:
     """Joints (N,) of which a full turn more is the same pose: all that is coupled to them turns fully too."""
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
-    same = np.where(revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
+    same = np.where(robot.revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
     return np.asarray(same.all(axis=0))
 
 

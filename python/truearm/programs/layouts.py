@@ -15,11 +15,10 @@ from truearm.rotations import (
     quaternion_from_matrix,
     rotation_vector_from_matrix,
 )
-from truearm.units import MM_PER_METRE
+from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 
-FULL_TURN: Final = 2.0 * np.pi
 HALF_TURN_DEG: Final = 180.0
 LOCKED: Final = 1e-7
 DECIMALS_MM, DECIMALS_M, DECIMALS_DEG, DECIMALS_RAD, DECIMALS_QUATERNION = 3, 6, 4, 6, 7
@@ -102,8 +101,8 @@ class Joints:
     @classmethod
     def of(cls, joints: Sequence[str], *, degrees: bool = True, millimetres: bool = True) -> "Joints":
         """For an arm's `joints`, each "revolute" or "prismatic"."""
-        angle = (np.pi / 180.0, DECIMALS_DEG) if degrees else (1.0, DECIMALS_RAD)
-        length = (1e-3, DECIMALS_MM) if millimetres else (1.0, DECIMALS_M)
+        angle = (RADIANS_PER_DEGREE, DECIMALS_DEG) if degrees else (1.0, DECIMALS_RAD)
+        length = (1.0 / MM_PER_METRE, DECIMALS_MM) if millimetres else (1.0, DECIMALS_M)
         chosen = [angle if joint == "revolute" else length for joint in joints]
         return cls(tuple(unit for unit, _ in chosen), tuple(decimals for _, decimals in chosen))
 

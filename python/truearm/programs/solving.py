@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, EDGE_RAD, FULL_TURN, NearestTurns, meant, with_turns
+from truearm.programs.configuration import ANY, EDGE_RAD, NearestTurns, meant, with_turns
 from truearm.programs.layouts import of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight, numbers_of
 from truearm.programs.rounding import rounded_rad
@@ -20,6 +20,7 @@ from truearm.programs.tables import NOWHERE, placed, run_of
 from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -24,6 +24,7 @@ from truearm.programs.configuration import ANY
 from truearm.programs.layouts import EulerPose
 from truearm.programs.turning import ON_THE_EDGE, turns
 from truearm.robot import Robot
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +33,6 @@ LETTERS: Final = ("NF", "UD", "TB")
 ORDERS: Final = ((0, 3, 5), (3, 4, 5))
 TURNING: Final = (0, 3, 4, 5)
 ELBOW: Final = len(LETTERS) + len(TURNING)
-FULL_TURN: Final = 2.0 * np.pi
 MOST_TURNS: Final = 99
 SAME_M, SAME_RAD = 1e-3, 1e-3
 COLUMNS: Final = len(LETTERS) + 3

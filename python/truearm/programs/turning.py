@@ -5,12 +5,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.units import FULL_TURN
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 EDGE_RAD: Final = 2e-5
 ON_THE_EDGE: Final = 2**20
-HALF_TURN, FULL_TURN = np.pi, 2.0 * np.pi
 
 
 def turns(q: Floats) -> Integers:
@@ -20,6 +21,6 @@ def turns(q: Floats) -> Integers:
     decides: no number says for certain what is meant there.
     """
     found: Integers = np.round(q / FULL_TURN).astype(np.int64)
-    apart = np.abs(np.abs(q - FULL_TURN * found) - HALF_TURN)
+    apart = np.abs(np.abs(q - FULL_TURN * found) - 0.5 * FULL_TURN)
     found[apart < EDGE_RAD] = ON_THE_EDGE
     return found

@@ -22,7 +22,6 @@ from truearm.rotations import rigid_inverse
 Transform = NDArray[np.float64]
 
 AXES: Final = 6
-DEGREE: Final = math.pi / 180.0
 _POSE: Final = RotationVectorPose()
 _DEEPEST: Final = 60
 _ARITHMETIC: Final[dict[str, Callable[[float, float], float]]] = {

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from truearm.programs.tables import Number
 from truearm.programs.urscript_constants import (
     AXES,
-    DEGREE,
     Constants,
     RunTime,
     moving,
@@ -18,6 +17,7 @@ from truearm.programs.urscript_constants import (
 )
 from truearm.programs.urscript_syntax import Node
 from truearm.rotations import rigid_inverse
+from truearm.units import RADIANS_PER_DEGREE
 
 Transform = NDArray[np.float64]
 
@@ -224,7 +224,7 @@ def numbers_of(leaf: Node) -> list[Number]:
 def _number(node: Node, place: int) -> Number:
     factor = 1.0
     if node.kind == "call" and node.text == "d2r" and len(node.parts) == 1:
-        node, factor = node.parts[0], DEGREE
+        node, factor = node.parts[0], RADIANS_PER_DEGREE
     if node.kind != "number":
         raise RunTime(f"number {place} of it is written as an expression")
     value = float(node.text)

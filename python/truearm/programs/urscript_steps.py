@@ -12,10 +12,10 @@ from truearm.programs.layouts import of_joints
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.stepping import lines_before, target_of, written
-from truearm.programs.urscript_constants import DEGREE
 from truearm.programs.urscript_lines import STREAMED, blend_radius
 from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
+from truearm.units import RADIANS_PER_DEGREE
 
 FILLED: Final = 0.9
 """Share of its room that the blending of a waypoint fills."""
@@ -90,7 +90,7 @@ def _target(program: Program, step: LinearStep) -> str:
     numbers = list(map(written, step.values, step.decimals))
     first = int(targets.first[target])
     for place, factor in enumerate(targets.factors[first : first + len(numbers)].tolist()):
-        if factor == DEGREE:
+        if factor == RADIANS_PER_DEGREE:
             numbers[place] = f"d2r({numbers[place]})"
     return f"{'[' if of_joints(layout) else 'p['}{', '.join(numbers)}]"
 

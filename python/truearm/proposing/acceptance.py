@@ -89,7 +89,7 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     joints = arm.robot.joint_count
     torque = arm.robot.joint_jacobian(candidates.readings)[:, 2, :]
     largest = np.abs(torque).max(axis=0)
-    turning = np.flatnonzero((largest > 1e-6) & (np.array(arm.robot.joints) == "revolute"))
+    turning = np.flatnonzero((largest > 1e-6) & arm.robot.revolute)
     bent = offsets[:, :, turning] * (torque / np.where(largest > 0.0, largest, 1.0))[:, None, turning]
     std = np.array([arm_std(arm, name, options) for name in names])
     setup = candidates.setup * setup_std(arm, candidates.selection, options, known=True)

@@ -94,7 +94,7 @@ class Candidates:
 
     @property
     def shown(self) -> str:
-        """The same in words."""
+        """What would be measured, in words."""
         turned = "with" if self.selection.orientation else "without"
         return f"{count_of(len(self.selection.targets), 'target')} {turned} orientation"
 

@@ -13,7 +13,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.reporting.style import colour_of, dash_of
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Floats = NDArray[np.float64]
 
@@ -175,7 +175,7 @@ def orientation(facts: Facts) -> list[Figure]:
     if facts.held is None:
         return []
     turned = {
-        name: np.linalg.norm(found.orientation, axis=1) * 1e3
+        name: np.linalg.norm(found.orientation, axis=1) * MRAD_PER_RAD
         for name, found in facts.held.errors.items()
         if found.orientation is not None
     }

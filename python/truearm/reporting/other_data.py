@@ -7,12 +7,12 @@ import numpy as np
 from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED
 from truearm.doubts.of_results import OF_NO_USE
 from truearm.evaluation import Evaluation
+from truearm.judgement.validation import HEADINGS, STATISTICS
 from truearm.reporting.advice import Advice
 from truearm.reporting.facts import ROWS, Facts
 from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import fixed, short
 from truearm.reporting.parts import Part, Section, Table
-from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.solving import FEATURE_RANGE
 from truearm.units import MM_PER_METRE
 

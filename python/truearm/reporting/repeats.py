@@ -58,7 +58,7 @@ class Repeats:
         data = rows.data
         target = data.most_held(selection.targets)
         which = selection.targets.index(target)
-        seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
+        seen = np.flatnonzero(data.seen(target))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
         stated = _stated_approach(data)
         approach = (_approach(data) if stated is None else stated)[order]

@@ -6,7 +6,6 @@ from typing import Any
 
 from truearm.calibration import Calibration
 from truearm.evaluation import Evaluation
-from truearm.fits.fitting import Stages, no_stages
 from truearm.reporting.advice import MOST, Advice, advise
 from truearm.reporting.corrections import compensation
 from truearm.reporting.facts import Facts
@@ -23,6 +22,7 @@ from truearm.reporting.since_update import since_update
 from truearm.reporting.trust import trust
 from truearm.reporting.varying import varying
 from truearm.reporting.verdict import head, verdict
+from truearm.stages import Stages, no_stages
 
 Chapter = tuple[str, Callable[[Facts], Section]]
 

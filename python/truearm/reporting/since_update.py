@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from truearm.errors import count_of
-from truearm.judgement.validation import Validation
+from truearm.judgement.validation import HEADINGS, STATISTICS, Validation
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
-from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.update_words import follows_words, motion_name, of_known_world, untested_joints, untested_words
 
 VERDICTS: Final = {

@@ -7,7 +7,7 @@ import numpy as np
 from truearm.doubts.of_results import NEAR_MM, gains_nothing, helps, nothing_to_gain
 from truearm.errors import count_of
 from truearm.fits.models import NOMINAL, leaves_noise
-from truearm.judgement.validation import Statistics
+from truearm.judgement.validation import HEADINGS, STATISTICS, Statistics
 from truearm.outlier_fate import taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
@@ -15,8 +15,6 @@ from truearm.reporting.parts import Card, Head, Table, Tone
 
 GOOD: Final = 0.6
 """A calibration that leaves less than this part of the error is a good one."""
-STATISTICS: Final = ("mean", "rms", "p95", "p99", "max")
-HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
 
 
 def head(facts: Facts, advice: list[tuple[str, str]]) -> Head:

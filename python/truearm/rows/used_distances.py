@@ -14,7 +14,7 @@ def holds_distances(data: Measurements) -> bool:
     """
     if data.distance_m is None:
         return False
-    has_point = np.asarray(np.any(np.all(np.isfinite(data.targets), axis=2), axis=1))
+    has_point = np.asarray(data.seen().any(axis=1))
     if has_point.any() and not has_point.all():
         raise InputError(
             f"only distances were measured in {data.row_names(~has_point)}, points in others",

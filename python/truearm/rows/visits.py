@@ -78,10 +78,7 @@ def one_row_a_pose(data: Measurements) -> Measurements:
 
 def _seen(data: Measurements) -> NDArray[np.bool_]:
     """Which targets each row holds, and last whether an orientation, if there are any."""
-    seen: NDArray[np.bool_] = np.asarray(np.isfinite(data.targets).all(axis=2))
-    if data.orientations is None:
-        return seen
-    return np.column_stack([seen, np.isfinite(data.orientations).all(axis=1)])
+    return data.seen() if data.orientations is None else np.column_stack([data.seen(), data.oriented])
 
 
 def _one_row_each(data: Measurements, numbers: Rows) -> Measurements:

@@ -22,7 +22,7 @@ from truearm.units import to_si
 Floats = NDArray[np.float64]
 
 LENGTHS: Final = ("d", "a")
-UNLIMITED: Final = {"revolute": np.pi, "prismatic": 0.5}
+OPEN_REACH_M: Final = 0.5
 
 
 def default_parameters(robot: Robot) -> list[str]:
@@ -85,9 +85,7 @@ def amount_si(name: str, amount: float) -> float:
 
 def joint_ranges(robot: Robot) -> tuple[Floats, Floats]:
     """Lowest and highest readings (N,); half a turn or half a metre where there is no limit."""
-    reach = np.array([UNLIMITED[kind] for kind in robot.joints])
-    low, high = robot.limits.T
-    return np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    return robot.finite_limits(OPEN_REACH_M)
 
 
 def direction(rng: np.random.Generator) -> Floats:

@@ -101,7 +101,7 @@ class VirtualArm:
         self._true_table = nominal_rows(robot) + self.errors
         thermal = self.imperfections.thermal
         self._drift = None if thermal is None else stated_rows(robot, thermal.drift_per_k)
-        self._waving = [j for j, kind in enumerate(robot.joints) if kind == "revolute"][:MAJOR_JOINTS]
+        self._waving = np.flatnonzero(robot.revolute)[:MAJOR_JOINTS].tolist()
         outputs = 3 if self.imperfections.non_geometric == "cartesian" else len(self._waving)
         self._harmonics = rng.normal(scale=DRAWN_HARMONIC, size=(2 * len(self._waving), outputs))
         self._harmonics *= self._scale_to_share()
@@ -225,7 +225,7 @@ class VirtualArm:
         orientation: bool = False,
         conditions: Conditions | None = None,
     ) -> pd.DataFrame:
-        """The same as a table with columns q1 ... qN in rad and m, x y z in m, and qw qx qy qz if asked.
+        """What `measure` gives, as columns q1 ... qN in rad and m, x y z in m, and qw qx qy qz if asked.
 
         Where the conditions say so, payload_kg and temperature_c are further columns.
 

@@ -106,7 +106,7 @@ def stated_sigma_mm(calibration: "Calibration") -> Floats | float:
     rows = calibration.rows
     if rows is None or rows.data.sigma_m is None:
         return 0.0
-    return np.asarray(MM_PER_METRE * np.nan_to_num(rows.data.sigma_m))
+    return MM_PER_METRE * rows.data.stated_sigma_m
 
 
 def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:

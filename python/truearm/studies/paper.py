@@ -1,7 +1,7 @@
 """The paper's simulations, section 6: each figure for one seed, and all of them over seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, closing
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
@@ -9,9 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.defaults import PAPER_FIGURES
 from truearm.errors import UsageError
-from truearm.fits.fitting import no_stages
 from truearm.planning.pool import PoolOptions, draw_pool
+from truearm.stages import Stages, no_stages
 from truearm.studies.experiment import Experiment, Plan, conduct
 from truearm.studies.metrics import Trace, along, over_seeds, sizes, trace
 from truearm.studies.schemes import (
@@ -39,10 +40,8 @@ from truearm.studies.setting import (
 from truearm.workers import check_workers, run_tasks
 
 Floats = NDArray[np.float64]
-Stages = Callable[[str], AbstractContextManager[Any]]
 Result = dict[str, Any]
 
-FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
 RANDOM_PATHS: Final = 10
 REGION_POSES: Final = 500
 SENSITIVITY: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -118,7 +117,7 @@ def run(
 
     Args:
         seeds: Seeds of the arms.
-        figures: Of FIGURES.
+        figures: Of PAPER_FIGURES.
         stages: Called with the name of each stage; gives a context manager that surrounds it.
         scheduler: Address of a Dask scheduler, as in run_tasks.
         workers: Local processes at the most, as in run_tasks.
@@ -127,10 +126,10 @@ def run(
         UsageError: If there is no such figure or no seed.
         Exception: What a seed raised.
     """
-    unknown = [name for name in figures if name not in FIGURES]
+    unknown = [name for name in figures if name not in PAPER_FIGURES]
     if unknown or not seeds:
         what = f'there is no figure "{unknown[0]}"' if unknown else "no seed is given"
-        raise UsageError(what, rule=f"Figures are {', '.join(FIGURES)}; at least one seed is needed")
+        raise UsageError(what, rule=f"Figures are {', '.join(PAPER_FIGURES)}; at least one seed is needed")
     check_workers(scheduler, workers)
     kept: dict[str, Kept] = {}
     with stages(f"seed 1 of {len(seeds)}"):

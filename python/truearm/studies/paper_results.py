@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from truearm.fits.fitting import no_stages
+from truearm.stages import Stages, no_stages
 from truearm.studies.claims import judged
 from truearm.studies.division_picture import save_division
 from truearm.studies.experiment import Plan, conduct
 from truearm.studies.panels import save_panels
-from truearm.studies.paper import Drawn, Stages, run
+from truearm.studies.paper import Drawn, run
 from truearm.studies.paper_page import page
 from truearm.studies.statements import checked
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.rotations import euler_from_rotation, quaternion_from_euler, quaternion_from_rotation_vector
+from truearm.units import FULL_TURN
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -19,7 +20,6 @@ ORDERS: Final = tuple("".join(axes) for axes in product("XYZ", repeat=3) if axes
 MOVING: Final = tuple(dict.fromkeys([*USUAL, *ORDERS]))
 FIXED: Final = tuple(order.lower() for order in MOVING)
 VECTOR: Final = "rotation vector"
-TURN: Final = 2.0 * np.pi
 LEAST_TURN: Final = 1e-12
 
 
@@ -83,7 +83,7 @@ def _numbers(rotation: "Rotation", kind: str) -> tuple[Floats, Floats]:
         # What is not turned has no axis: a whole turn may be about any.
         turned = angle > LEAST_TURN
         axes = np.where(turned, vectors, [1.0, 0.0, 0.0]) / np.where(turned, angle, 1.0)
-        return vectors, (angle - TURN) * axes
+        return vectors, (angle - FULL_TURN) * axes
     first, middle, last = euler_from_rotation(rotation, kind).T
     other = -middle if kind[0] == kind[2] else np.pi - middle
     return (

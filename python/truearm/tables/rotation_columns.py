@@ -14,7 +14,7 @@ from truearm.rotations import (
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
 )
-from truearm.units import ANGLE_UNITS, to_si
+from truearm.units import ANGLE_UNITS, FULL_TURN, to_si
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ FORMS: Final = (
     "quaternion:wxyz=A,B,C,D (or xyzw)",
     "matrix=R11,R12,R13,R21,R22,R23,R31,R32,R33 (row by row)",
 )
-A_TURN: Final = 2.0 * np.pi * (1.0 + 1e-6)
+A_TURN: Final = FULL_TURN * (1.0 + 1e-6)
 ROUNDED: Final = 0.02
 """So far from unit length and right angles are a rotation matrix's columns with few decimals, at the most."""
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
+from truearm.doubts.admitted import admitted
 from truearm.doubts.of_results import LARGE_MM
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import (
     InputError,
@@ -24,12 +23,13 @@ from truearm.errors import (
 )
 from truearm.fits.core_set import select_fitted
 from truearm.fits.fitted_rows import known_rows, overwhelming
-from truearm.fits.fitting import Stages, Task, no_stages
+from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_visit
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
+from truearm.stages import Stages, no_stages
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
@@ -174,9 +174,7 @@ def update(
     """
     chosen = kinds.chosen(UpdateOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
-    notices = check_against(data, calibration.robot)
-    data, together = points_together(data.deduplicated())
-    notices += together
+    data, notices = admitted(data, calibration.robot)
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data = one_row_a_visit(data)
     task, left_out = _task(calibration, data, chosen, stages)
@@ -325,9 +323,9 @@ def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, option
 
 
 def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
-    scene_values = 3 * int(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum())
-    if task.selection.orientation and data.orientations is not None:
-        scene_values += 3 * int(np.isfinite(data.orientations).all(axis=1).sum())
+    scene_values = 3 * int(data.seen(task.selection.targets).sum())
+    if task.selection.orientation:
+        scene_values += 3 * int(data.oriented.sum())
     wanted = int(unknowns.free.sum())
     if scene_values > wanted:
         return
@@ -345,8 +343,7 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 def _check_groups(data: Measurements, task: Task) -> None:
     """Each pose is judged by the others: they have to find its frame and target."""
     fewest = FOUND_FROM + -(-len(data) // MOST_PARTS)
-    points = np.isfinite(data.targets[:, list(task.selection.targets)])
-    seen = np.logical_or.reduce(np.logical_and.reduce(points, axis=2), axis=1)
+    seen = data.seen(task.selection.targets).any(axis=1)
     for group in task.groups:
         count = int((seen & (data.group == group)).sum())
         if count < fewest:

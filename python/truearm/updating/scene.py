@@ -208,8 +208,7 @@ class Scene:
 
     def _seen(self) -> Mask:
         """Which values (n, m) were measured."""
-        points = np.isfinite(self.data.targets[:, list(self.task.selection.targets)])
-        seen = np.repeat(np.logical_and.reduce(points, axis=2), 3, axis=1)
+        seen = np.repeat(self.data.seen(self.task.selection.targets), 3, axis=1)
         turned = np.isfinite(rotations(self.data)[:, 0, :1])
         return np.hstack([seen, np.repeat(turned, self._turns, axis=1)])
 

@@ -5,10 +5,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Setup, fit_constant
+from truearm._core import Setup
 from truearm.calibration import Calibration
-from truearm.fits.core_set import core_set
-from truearm.fits.fitting import core_errors, fit_options
+from truearm.fits.fitting import fit_setup
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.judgement.judging import model_inputs
 from truearm.judgement.validation import RowErrors, at_first_measured, row_errors
@@ -71,6 +70,4 @@ def setup_of(model: ArmModel, scene: Scene, data: Measurements) -> Setup:
     """Frames and tools of a model that rows of an update find."""
     task = scene.task
     at = model.parameters(model_inputs(task.arm, data, task.options.features))
-    measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    with core_errors(data):
-        return fit_constant(task.problem(measured, []), fit_options(task.threads, parameters=at)).setup
+    return fit_setup(task, data, at).setup

@@ -95,7 +95,7 @@ class CorrectedArm:
         left = constant.errors(prepared, data) - self.correction.predict(poses)
         if target == 0:
             return left
-        train = prepared.train.select(np.isfinite(prepared.train.targets[:, target]).all(axis=1))
+        train = prepared.train.select(prepared.train.seen(target))
         seen = prepared.poses(train, target)
         known = constant.errors(prepared, train) - self.correction.predict(seen)
         return left - _shifts(seen, known, train.group, poses, data.group)

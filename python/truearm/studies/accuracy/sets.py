@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.doubts.plausibility import check_against
-from truearm.doubts.points_together import points_together
+from truearm.doubts.admitted import admitted
 from truearm.errors import InputError, Notice, UsageError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -104,10 +103,9 @@ def read_set(data_set: DataSet) -> Read:
         raise InputError(
             "distances were measured, not points", where=data_set.file, rule="Methods are judged at points"
         )
-    notices = check_against(data, robot)
-    data, together = points_together(data.deduplicated())
+    data, notices = admitted(data, robot)
     visits = one_row_a_visit(data)
-    notices += together + _shots(data, visits)
+    notices += _shots(data, visits)
     data = visits
     described = json.dumps(robot.to_dict(), sort_keys=True) + data.hash()
     short = hashlib.sha256(described.encode()).hexdigest()[:12]

@@ -119,7 +119,7 @@ def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
         InputError: If a column is empty or the rows cannot be divided.
     """
     read = read_set(data_set)
-    measured: NDArray[np.bool_] = np.asarray(np.isfinite(read.data.targets).all(axis=2))
+    measured = read.data.seen()
     fitted, judged = measured[:, 0], measured[:, cut.target]
     rows = np.flatnonzero(fitted | judged)
     split = _divided(read.data.select(rows), cut, seed)
@@ -141,7 +141,7 @@ def rows_of(data_set: DataSet, cut: Cut, seed: int, poses: int) -> Split:
     """
     split, data = divide(data_set, cut, seed), read_set(data_set).data
     train = split.train[:poses]
-    finding = train[np.isfinite(data.targets[train, cut.target]).all(axis=1)]
+    finding = train[data.seen(cut.target)[train]]
     holdout = split.holdout[np.isin(data.group[split.holdout], data.group[finding])]
     if len(holdout) < FEWEST_JUDGED:
         raise InputError(

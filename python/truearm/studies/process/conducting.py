@@ -1,7 +1,6 @@
 """The experiment conducted: the session measured, all schemes fitted to it, and judged on paths."""
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -21,6 +20,7 @@ from truearm.planning.pool import PoolOptions, needed_pool
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 from truearm.simulation import VirtualArm
+from truearm.stages import Stages
 from truearm.studies.experiment import Experiment, Plan
 from truearm.studies.metrics import Trace, along, sizes, trace
 from truearm.studies.paper import Drawn
@@ -40,7 +40,6 @@ from truearm.studies.setting import WORKSPACE_POSES
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
-Stages = Callable[[str], AbstractContextManager[Any]]
 Result = dict[str, Any]
 
 RANDOM_PATHS: Final = 10

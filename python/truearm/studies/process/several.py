@@ -8,10 +8,10 @@ from typing import Final
 from truearm.cell.measuring import Progress
 from truearm.errors import InputError
 from truearm.files import make_directory, write_whole
-from truearm.fits.fitting import no_stages
+from truearm.stages import Stages, no_stages
 from truearm.studies.metrics import over_seeds
 from truearm.studies.paper import Drawn
-from truearm.studies.process.conducting import Result, Stages, conduct_experiment
+from truearm.studies.process.conducting import Result, conduct_experiment
 from truearm.studies.process.judging import judged, judged_over_arms
 from truearm.studies.process.setting import Setting, cell_text
 from truearm.workers import Done, check_workers, run_tasks

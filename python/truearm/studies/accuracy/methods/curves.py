@@ -13,6 +13,7 @@ from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.linear import Ridge, fit_linear
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.poses import Poses
+from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +21,6 @@ DEGREE: Final = 3
 CELLS: Final = (24, 48, 96, 144)
 HEIGHTS_RAD: Final = (1e-3, 3e-4, 1e-4)
 BENDS_RAD: Final = (1e-3, 3e-4, 1e-4, 3e-5)
-FULL_TURN: Final = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)

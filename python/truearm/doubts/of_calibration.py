@@ -1,0 +1,161 @@
+"""All that rows, fits and errors may tell against a calibration, looked for when it is made."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.doubts.conventions import fits_otherwise
+from truearm.doubts.distance_zero import zero_notices
+from truearm.doubts.exchanged import exchanges
+from truearm.doubts.known_world import another_frame
+from truearm.doubts.moved_joints import moved_joints
+from truearm.doubts.of_results import (
+    FAR_FROM_NOMINAL,
+    NO_HELP,
+    SINGLE_ROWS,
+    Outliers,
+    constant_is_better,
+    doubts,
+    mounting,
+    poses_aside,
+    stated_too_large,
+)
+from truearm.doubts.rounded_readings import rounded_notices
+from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.uneven_setups import uneven_setups
+from truearm.doubts.whitened import Whitened
+from truearm.errors import Notice
+from truearm.fits.details import VariableDetails, left_m
+from truearm.fits.endpoints import at_tool
+from truearm.fits.enough_values import group_unknowns
+from truearm.fits.fitting import Fits, Task
+from truearm.fits.identifiability import Identifiability
+from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
+from truearm.judgement.judging import check_judged
+from truearm.measurements import Measurements
+from truearm.rows.splitting import Split, measured_on_both_sides
+from truearm.rows.visits import pose_count
+from truearm.stages import Stages
+from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
+
+Floats = NDArray[np.float64]
+
+OPEN_SETUP: Final = "open_setup"
+
+
+def of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
+    """Of which held-out rows errors say less, and which are not judged."""
+    train, held = given.select(split.train), given.select(split.holdout)
+    return [*measured_on_both_sides(given, split), *check_judged(train, held, task.selection)]
+
+
+def of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
+    """What the last fit shows of the set-up and of how the arm stands."""
+    aside = 0 if final.variable is None else final.variable.stood_aside
+    return [
+        *_open_setup(task, final.identifiability, final.data),
+        *poses_aside(aside, pose_count(final.data)),
+        *mounting(variable),
+    ]
+
+
+def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:
+    """A notice where frames and targets cannot all be told apart, as on a SCARA or from poses too alike."""
+    if task.selection.distances:
+        return []
+    unknowns = sum(group_unknowns(task, data.select(data.group == group)) for group in task.groups)
+    rank = found.total_rank - found.rank
+    if rank >= unknowns:
+        return []
+    text = (
+        f"The poses determine {rank} of {unknowns} unknowns of frame and target: predictions of the measured "
+        "target are not harmed, but along what is left open neither the base's place in the world nor the "
+        "target's on the flange is known, and corrections for other tools depend on that."
+    )
+    return [Notice(OPEN_SETUP, text)]
+
+
+def of_left(found: Calibration, progress: Floats) -> list[Notice]:
+    """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
+    if found.rows is None or found.scheme is not None or found.selection.distances:
+        return []
+    seen = Whitened.of(found, found.rows, progress)
+    return [*uneven_setups(found, found.rows, seen), *moved_joints(found, seen, progress)]
+
+
+def of_result(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
+    """What makes a calibration doubtful; where it does not help, or found another arm, with what would
+    fit instead.
+    """
+    doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
+    if _many_are_off(found, doubted):
+        with stages("looking for lost rows"):
+            shifted = fits_shifted(task, data)
+    if shifted:
+        doubted = _of_errors(task, found, data, None)
+        return [*doubted[:1], *shifted, *doubted[1:]]
+    framed = _framed(task, found)
+    exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
+    if exchanged.notices:
+        told = replace(found, notices=exchanged.notices)
+        doubted = _of_errors(task, told, data, Outliers.of(told), exchanged.unbent)
+    doubted[1:1] = framed
+    wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
+    if not framed and any(notice.kind in wrong for notice in doubted):
+        with stages("trying other conventions"):
+            doubted[1:1] = fits_otherwise(task, data)
+    return [*exchanged.notices, *doubted]
+
+
+def _is_in_doubt(doubted: Sequence[Notice]) -> bool:
+    """Whether errors or parameters are such that rows may be wrong of which none is an outlier."""
+    return any(notice.kind in {NO_HELP, SINGLE_ROWS, FAR_FROM_NOMINAL} for notice in doubted)
+
+
+def _framed(task: Task, found: Calibration) -> list[Notice]:
+    """Whether rows of a known world would fit far better with a frame that is found."""
+    left = left_m(found.constant, found.variable)
+    return [] if found.rows is None else another_frame(task, found.rows.fitted, left)
+
+
+def _of_errors(
+    task: Task,
+    found: Calibration,
+    data: Measurements,
+    outliers: Outliers | None,
+    unbent: ArmModel | None = None,
+) -> list[Notice]:
+    """What the errors of a calibration say against it, and which outliers may be to blame.
+
+    Constants that these did not bend are held against the table in place of its own, if there are such.
+    """
+    judged, best = found.validation, found.model_name
+    points = None if found.selection.distances else found.held
+    models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
+    return [
+        *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
+        *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
+        *stated_too_large(data, judged, best, points),
+        *constant_is_better(judged, best, points, outliers),
+        *_rounded(found, data),
+    ]
+
+
+def _rounded(found: Calibration, data: Measurements) -> list[Notice]:
+    """Whether readings have so few decimals that what is taken for noise is theirs."""
+    points = found.measured.points(found.model.setup.targets)
+    if found.selection.distances or not len(points):
+        return []
+    at_point = replace(found.robot, tool=at_tool(found.robot, points[0]))
+    return rounded_notices(at_point, data.readings, whole_noise_mm(found))
+
+
+def _many_are_off(found: Calibration, doubted: Sequence[Notice]) -> bool:
+    """Whether so many rows are off, or off from some row on, that they may belong to other points."""
+    drift, outliers = found.validation.drift, [] if found.rows is None else found.rows.outliers()
+    of_no_use = any(notice.kind in {NO_HELP, SINGLE_ROWS} for notice in doubted)
+    return of_no_use or len(outliers) > CHANGE or (drift is not None and bool(drift.jumps))
