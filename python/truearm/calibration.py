@@ -29,7 +29,7 @@ from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.inputs import Features, feature_columns
 from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.validation import Validation
-from truearm.kinds import words
+from truearm.kinds import content_bytes, words
 from truearm.lengths import length_mm
 from truearm.limits import Task
 from truearm.revision import Revision
@@ -110,10 +110,15 @@ class Calibration:
         return cls.from_bytes(read_calibration(as_path(path)), where=str(path))
 
     @classmethod
-    def from_bytes(cls, data: bytes, *, where: str) -> "Calibration":
-        """The calibration of a file's content; `where` is named in errors, which are those of `load`."""
-        arrays, content = parse_calibration(data, where)
-        return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
+    def from_bytes(cls, data: bytes | bytearray | memoryview, *, where: str) -> "Calibration":
+        """The calibration of a file's content; `where` is named in errors, which are those of `load`.
+
+        Raises:
+            UsageError: If these are no bytes.
+        """
+        file = content_bytes(data, "the content of a calibration file")
+        arrays, content = parse_calibration(file, where)
+        return cls(**calibration_content.unpack(arrays, content, where=where), file=file)
 
     def __repr__(self) -> str:
         joints, judged = self.robot.joint_count, self.validation
@@ -133,15 +138,8 @@ class Calibration:
         """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
         bounds = self.conservative if self.has_conservative else None
         revision = None if self.revision is None else self.revision.stripped()
-        return replace(
-            self,
-            rows=None,
-            held=None,
-            file=None,
-            fitted_spread=None,
-            stored_conservative=bounds,
-            revision=revision,
-        )
+        left_out: dict[str, Any] = dict.fromkeys(("rows", "held", "file", "fitted_spread"))
+        return replace(self, stored_conservative=bounds, revision=revision, **left_out)
 
     def save(self, path: str | Path, *, with_rows: bool = True) -> None:
         """Write a calibration file, completely or not at all.
@@ -358,8 +356,7 @@ class Calibration:
         """Whether bounds of the standard deviation are there or can be worked out."""
         if self.scheme is not None:
             return False
-        known = self.stored_conservative is not None or self.rows is not None
-        return known or self.variable is None
+        return self.stored_conservative is not None or self.rows is not None or self.variable is None
 
     @cached_property
     def conservative(self) -> Conservative:

@@ -24,6 +24,7 @@ from truearm.solving import (
     core_options,
     feature_names,
     feature_values,
+    moving_joints,
     plain_model,
 )
 from truearm.units import MM_PER_METRE
@@ -132,8 +133,8 @@ class Compensator:
         self.task: Task = task
         self.limits = required(limits or Limits(), Limits, "the limits")
         self._check_joints(self.programming)
-        self._moving = moving
-        self._options = core_options(calibration.robot, task, moving, self.limits)
+        self._moving = moving_joints(calibration.robot, moving)
+        self._options = core_options(calibration.robot, task, self._moving, self.limits)
         self._features = feature_values(calibration, features)
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
@@ -225,7 +226,7 @@ class Compensator:
         return feature_names(self.calibration)
 
     @property
-    def features(self) -> list[float]:
+    def features(self) -> tuple[float, ...]:
         """Values of the features that the calibration depends on, in its order."""
         return self._features
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers, as_row_numbers
+from truearm.arrays import as_numbers, as_row_numbers, read_only
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import required
@@ -109,7 +109,7 @@ class Measurements:
         if not self.joint_units:
             object.__setattr__(self, "joint_units", ("",) * self.joint_count)
         if self.tables is None and self.default_group is not None:
-            object.__setattr__(self, "tables", _frozen(identities(self)))
+            object.__setattr__(self, "tables", read_only(identities(self)))
 
     def _freeze(self) -> None:
         """Check that arrays and features have a row for each pose, and make them own and read-only."""
@@ -117,7 +117,7 @@ class Measurements:
             value = getattr(self, name)
             if value is not None or name not in OPTIONAL:
                 array = _as_array(name, value)
-                object.__setattr__(self, name, _frozen(array))
+                object.__setattr__(self, name, read_only(array))
                 self._check_length(name, array)
         self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
         object.__setattr__(self, "features", self.features.reset_index(drop=True))
@@ -444,15 +444,6 @@ def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind not in "iu":
         raise InputError(f"values of type {array.dtype}", where=name, rule="They must be whole numbers")
     return array.astype(np.int64, copy=False)
-
-
-def _frozen(values: NDArray[Any]) -> NDArray[Any]:
-    """An array that nothing changes: itself where it is read-only, else a copy."""
-    if not values.flags.writeable:
-        return values
-    copied = values.copy()
-    copied.flags.writeable = False
-    return copied
 
 
 def _padded_targets(parts: Sequence[Measurements]) -> Floats:
