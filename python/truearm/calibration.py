@@ -46,6 +46,8 @@ Floats = NDArray[np.float64]
 class Calibration:
     """Identified parameters of an arm. SI units; parameters in the order links, theta, d, a, alpha, beta.
 
+    `calibrate`, `load` and `from_bytes` make one.
+
     Joint readings `q` are (n, N), or (N,) for one, and results have the same leading dimension. Where the
     calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
     name, also as a DataFrame. Without `group`, positions and poses are those of the robot file's tool, or of
@@ -371,7 +373,7 @@ class Calibration:
     def pose_variances(
         self, q: ArrayLike, tool: ArrayLike | None, features: Features | None
     ) -> tuple[Floats, Floats, Floats]:
-        """Inputs (n, I) of readings, and variances (n, 6) of a tool's pose: now, and before any measurement.
+        """Internal: inputs (n, I) of readings, variances (n, 6) of a tool's pose now and before measuring.
 
         They are in the base frame, m^2 and rad^2.
         """
@@ -461,7 +463,7 @@ class Calibration:
         return as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
 
     def field_inputs(self, rows: Floats, features: Features | None) -> Floats:
-        """Inputs (n, I) of the field at readings (n, N): joint values, then features."""
+        """Internal: inputs (n, I) of the field at readings (n, N), joint values and then features."""
         columns = feature_columns(features, self.options.features, len(rows))
         values = self.robot.values_of(rows)
         return np.hstack([values, columns]) if columns.shape[1] else values

@@ -236,7 +236,7 @@ class Compensator:
         return dict(zip(self.feature_names, self._features, strict=True))
 
     def corrector(self, tool: ArrayLike | None = None) -> Corrector:
-        """The core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
+        """Internal: the core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
         return self._corrector(self._tool(tool))
 
     def _check_joints(self, programming: Robot) -> None:

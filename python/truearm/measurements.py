@@ -60,6 +60,8 @@ GROUPS_SHOWN: Final = 3
 class Measurements:
     """n poses of an N-joint arm and what was measured there. SI units; world is the device's frame.
 
+    `read_csv`, `read_touches`, `read_files`, `from_dataframe` and `concatenate` make one.
+
     Attributes:
         readings: Joint readings (n, N), rad or m.
         targets: Measured points on the tool, in world (n, T, 3); NaN where a point was not measured.
@@ -353,13 +355,13 @@ class Measurements:
         return digest.hexdigest()
 
     def most_held(self, among: Sequence[int] | None = None) -> int:
-        """The target, an index from 0, that most rows hold, of all or `among` some."""
+        """Internal: the target, an index from 0, that most rows hold, of all or `among` some."""
         places = list(range(self.target_count)) if among is None else list(among)
         held = np.isfinite(self.targets[:, places]).all(axis=2).sum(axis=0)
         return places[int(held.argmax())]
 
     def row_names(self, mask: NDArray[np.bool_]) -> str:
-        """The rows of a mask (n,) in words, by their numbers in their files."""
+        """Internal: the rows of a mask (n,) in words, by their numbers in their files."""
         chosen = self.select(mask)
         parts = [(file, list_rows(chosen.rows[chosen.sources == file].tolist())) for file in chosen.files]
         if len(self.files) == 1:
@@ -367,7 +369,7 @@ class Measurements:
         return "; ".join(f"{rows} of {file}" for file, rows in parts)
 
     def require_joint_count(self, count: int | None) -> None:
-        """Raise InputError unless there are `count` joints; None asks for nothing."""
+        """Internal: raise InputError unless there are `count` joints; None asks for nothing."""
         if count is not None and self.joint_count != count:
             zero = next((name for name in self.features if re.fullmatch("q0(_[a-z]+)?", str(name))), None)
             raise InputError(
@@ -381,7 +383,7 @@ class Measurements:
             )
 
     def content(self) -> pd.DataFrame:
-        """Everything that was read (n, ...): a column for each number and name, features under their own."""
+        """Internal: all that was read, a column for each number and name, features under their own."""
         columns: dict[str, NDArray[np.generic]] = {}
         for name in CONTENT:
             value = getattr(self, name)

@@ -285,7 +285,7 @@ class Robot(RobotData):
         return as_rows(q, self.joint_count, what=f"joint readings of {self.name}")
 
     def values_of(self, readings: Floats) -> Floats:
-        """Joint values (n, N) of readings (n, N) that were checked."""
+        """Internal: joint values (n, N) of readings (n, N) that were checked."""
         return readings if self._uncoupled else np.ascontiguousarray(readings @ self.coupling.T)
 
     @cached_property

@@ -51,7 +51,7 @@ class StreamOptions:
                 )
 
     def core(self) -> dict[str, object]:
-        """The core's options, SI."""
+        """Internal: the core's options, SI."""
         return {
             "rate": [np.radians(self.rate_deg_s), self.rate_mm_s / MM_PER_METRE],
             "acceleration": [np.radians(self.acceleration_deg_s2), self.acceleration_mm_s2 / MM_PER_METRE],
