@@ -1,4 +1,8 @@
-"""Write docs/reference/python-docstrings.md from the docstrings of what is public."""
+"""Write docs/reference/python-docstrings.md from the docstrings of what is public.
+
+Members whose docstring begins with "Internal:" are left out, as they are of truearm's other modules. A class
+that says what makes one, in a line such as "`update` makes one.", is not shown as a call.
+"""
 
 import dataclasses
 import inspect
@@ -30,6 +34,8 @@ MODULES = {
     "truearm.fleet": (),
     "truearm.workers": ("run_tasks",),
 }
+INTERNAL = "Internal:"
+MADE = re.compile(r"^`.*` makes? one\b", re.MULTILINE)
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$")
 ITEM = re.compile(r"^ {4}(\*{0,2}[\w., ]+): (.*)$")
 STARS: dict[Any, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
@@ -57,14 +63,18 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
 
 
 def _is_plain(thing: Any) -> bool:
-    """Whether a signature says nothing: exceptions and protocols."""
-    return inspect.isclass(thing) and (issubclass(thing, Exception) or getattr(thing, "_is_protocol", False))
+    """Whether a signature says nothing: exceptions, protocols, and what is made in other ways."""
+    if not inspect.isclass(thing):
+        return False
+    made = MADE.search(inspect.getdoc(thing) or "")
+    return bool(made) or issubclass(thing, Exception) or getattr(thing, "_is_protocol", False)
 
 
 def _members(kind: type) -> Iterator[tuple[str, str, Any]]:
     """Name, call and what is documented of the public methods and properties of a class's own."""
     for name, member in vars(kind).items():
-        if name.startswith("_") or isinstance(member, type) or not inspect.getdoc(member):
+        words = inspect.getdoc(member)
+        if name.startswith("_") or isinstance(member, type) or not words or words.startswith(INTERNAL):
             continue
         function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
         if inspect.isfunction(function):

@@ -1,4 +1,4 @@
-"""Rigid transforms at the door: what is wrong with them is named, and nearly exact last rows are exact."""
+"""Arrays at the door: what is wrong is named, nearly exact last rows become exact, any bytes are taken."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,13 @@ from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from truearm.arrays import as_transforms, rotation_fault
+from truearm.planning import AboveFloor, accessible
 from truearm.simulation import VirtualArm
+from truearm.streaming import CorrectionStream
 from truearm.tables.rotation_columns import RotationColumns
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
+READING = np.radians([10.0, -80.0, 90.0, -90.0, -80.0, 5.0])
 
 
 def transform(turn=TURN, last=(0.0, 0.0, 0.0, 1.0)):
@@ -44,11 +47,15 @@ def test_a_last_row_that_is_nearly_exact_is_made_so_and_the_given_one_left():
     np.testing.assert_array_equal(given, before)
 
 
-def test_tools_and_targets_with_a_nearly_exact_last_row_are_taken():
+@pytest.fixture(scope="module")
+def found():
+    """A calibration by constants."""
     arm = VirtualArm(ta.Robot.load("ur10"), seed=2)
-    found = ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
-    q = np.radians([10.0, -80.0, 90.0, -90.0, -80.0, 5.0])
-    target = found.pose(q)
+    return ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
+
+
+def test_tools_and_targets_with_a_nearly_exact_last_row_are_taken(found):
+    q, target = READING, found.pose(READING)
     tool = transform(last=(1e-17, 0.0, 0.0, 1.0))
     np.testing.assert_array_equal(found.position(q, tool=tool), found.position(q, tool=transform()))
     target[3, 0] = 1e-17
@@ -61,3 +68,41 @@ def test_a_coarse_rule_takes_rotations_with_few_decimals_and_still_no_mirror():
     columns = RotationColumns.parse("matrix=a,b,c,d,e,f,g,h,i")
     with pytest.raises(ta.InputError, match="the nine numbers of row 1 are no rotation matrix: R mirrors"):
         columns.quaternions(np.diag([1.0, 1.0, -1.0]).reshape(1, 9))
+
+
+def packet(values):
+    """The same numbers behind one byte, as they stand in a telegram: not aligned."""
+    array = np.asarray(values, dtype=np.float64)
+    found = np.frombuffer(b"!" + array.tobytes(), np.float64, array.size, offset=1).reshape(array.shape)
+    assert not found.flags.aligned
+    return found
+
+
+DOORS = {
+    "robot.position": lambda c, q, as_given: c.robot.position(as_given(q)),
+    "robot.pose": lambda c, q, as_given: c.robot.pose(as_given(q)),
+    "robot.parameter_jacobian": lambda c, q, as_given: c.robot.parameter_jacobian(as_given(q), pose=True),
+    "robot.joint_jacobian": lambda c, q, as_given: c.robot.joint_jacobian(as_given(q)),
+    "robot.from_table": lambda c, q, as_given: ta.Robot.from_table("x", as_given(c.robot.table)).position(q),
+    "position": lambda c, q, as_given: c.position(as_given(q)),
+    "position of a tool": lambda c, q, as_given: c.position(q, tool=as_given(transform())),
+    "position of a point": lambda c, q, as_given: c.position(q, tool=as_given([0.0, 0.0, 0.1])),
+    "parameters": lambda c, q, as_given: c.parameters(as_given(q)),
+    "position_std": lambda c, q, as_given: c.position_std(as_given(q)),
+    "conservative_std": lambda c, q, as_given: c.conservative_std(as_given(q)),
+    "solve": lambda c, q, as_given: c.solve(as_given(c.pose(q)), as_given(q)),
+    "correct": lambda c, q, as_given: ta.Compensator(c).correct(as_given(q)),
+    "joints": lambda c, q, as_given: ta.Compensator(c).joints(as_given(q)).q,
+    "poses": lambda c, q, as_given: ta.Compensator(c).poses(as_given(c.robot.pose(q)), as_given(q)).q,
+    "stream": lambda c, q, as_given: CorrectionStream(ta.Compensator(c)).step(as_given(q), 0.0).q,
+    "inverse": lambda c, q, as_given: ta.Controller.nominal(c.robot).inverse.near(
+        c.robot.pose(q), as_given(q)
+    ),
+    "accessible": lambda c, q, as_given: accessible(c.robot, as_given(q), [AboveFloor(0.0)]),
+}
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_numbers_that_are_not_aligned_are_taken(door, found):
+    call = DOORS[door]
+    np.testing.assert_array_equal(call(found, READING, packet), call(found, READING, np.array))

@@ -274,6 +274,13 @@ def test_every_public_name_is_in_the_python_reference():
             assert re.search(rf"\b{name}\b", text), name
 
 
+def test_the_python_reference_shows_only_what_is_for_calls():
+    text = (ROOT / "docs" / "reference" / "python-docstrings.md").read_text()
+    assert not re.search(r"^#### \w+\.(core|corrector|values_of|field_inputs)$", text, re.MULTILINE)
+    assert ("`Calibration(" in text, "`Robot(" in text, "`Limits(" in text) == (False, False, True)
+    assert "Internal" not in text
+
+
 def load_script(name):
     spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None

@@ -3,12 +3,16 @@
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 
 from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.planning.accessibility import (
-    STEPS_ALONG_LINK,
     AboveFloor,
     InBox,
     InCone,
@@ -26,6 +30,8 @@ from truearm.planning.configurations import Configuration
 from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
 from truearm.planning.spaces import CartesianSpace, JointSpace, SphericalSpace
 from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
 
 RV_M2 = Robot.load("rv-m2")
 SHOULDER = (0.0, -0.08, 0.4)
@@ -116,8 +122,8 @@ def test_only_what_joints_lift_is_held_above_the_floor(name):
     robot = Robot.load(name)
     low, high = np.clip(robot.limits.T, -np.pi, np.pi)
     drawn = np.random.default_rng(5).uniform(low, high, (50, robot.joint_count))
-    points = Places(robot, drawn, robot.tool).arm_points[:, : STEPS_ALONG_LINK * standing_links(robot)]
-    np.testing.assert_allclose(np.ptp(points[:, :, 2], axis=0), 0.0, atol=1e-9)
+    corners = Places(robot, drawn, robot.tool).corners[:, : standing_links(robot) + 1]
+    np.testing.assert_allclose(np.ptp(corners[:, :, 2], axis=0), 0.0, atol=1e-9)
 
 
 def test_a_carriage_stands_on_its_rail(tmp_path):
@@ -180,6 +186,40 @@ def test_no_part_of_the_arm_may_be_in_the_box():
     assert accessible(RV_M2, np.stack([straight, lifted]), [elbow_room]).tolist() == [False, True]
 
 
+class Lines(Places):
+    """Places whose lines are given."""
+
+    def __init__(self, corners: Floats) -> None:
+        super().__init__(RV_M2, np.zeros((len(corners), 5)), np.eye(4))
+        self.__dict__["corners"] = corners
+
+
+SIXTEENTHS = st.integers(-16, 16).map(lambda count: count / 16.0)
+TRIPLES = arrays(np.float64, 3, elements=SIXTEENTHS)
+
+
+@given(arrays(np.float64, (2, 4, 3), elements=SIXTEENTHS), TRIPLES, TRIPLES, st.sampled_from([0.0, 0.01]))
+def test_no_line_that_meets_the_box_is_allowed(corners, one, other, margin):
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    part = np.linspace(0.0, 1.0, 200)[:, None]
+    points = corners[:, :-1, None] * (1.0 - part) + corners[:, 1:, None] * part
+    deep = ((points >= low - margin + 1e-9) & (points <= high + margin - 1e-9)).all(axis=3).any(axis=(1, 2))
+    near = ((points >= low - margin - 0.01) & (points <= high + margin + 0.01)).all(axis=3).any(axis=(1, 2))
+    allowed = KeepOut(low, high, margin)(Lines(corners))
+    assert not (allowed & deep).any()
+    assert (allowed | near).all()
+
+
+def test_nothing_goes_through_a_thin_plate_or_into_half_a_space():
+    upright = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.9]], [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]])
+    assert KeepOut((-0.5, -0.5, 0.301), (0.5, 0.5, 0.303))(Lines(upright)).tolist() == [False, True]
+    assert KeepOut((-np.inf, -np.inf, 0.7), np.full(3, np.inf))(Lines(upright)).tolist() == [False, True]
+    with pytest.raises(UsageError, match="the lowest and then the highest"):
+        KeepOut((0, 0, 1), (1, 1, 0))
+    with pytest.raises(UsageError, match="margin_m: -0.01. Zero or more"):
+        KeepOut((0, 0, 0), (1, 1, 1), -0.01)
+
+
 def test_a_users_own_rule_and_its_shape():
     readings = np.zeros((4, 5))
     readings[:, 0] = [0.1, 0.2, 0.3, 0.4]
@@ -187,6 +227,17 @@ def test_a_users_own_rule_and_its_shape():
     assert kept.tolist() == [False, True, True, True]
     with pytest.raises(InputError, match="shape"):
         accessible(RV_M2, readings, [lambda _: np.array([True])])
+
+
+def test_poses_to_judge_may_be_a_list_or_a_table():
+    readings = np.random.default_rng(6).uniform(-1.0, 1.0, (20, 5))
+    rules = [AboveFloor(0.3), KeepOut((0.1, 0.1, 0.0), (0.2, 0.3, 0.5))]
+    allowed = accessible(RV_M2, readings, rules)
+    for given_so in (readings.tolist(), pd.DataFrame(readings)):
+        np.testing.assert_array_equal(accessible(RV_M2, given_so, rules), allowed)
+    np.testing.assert_array_equal(accessible(RV_M2, readings[3], rules), allowed[3:4])
+    with pytest.raises(InputError, match=r"joint readings of .* have shape \(20, 4\)"):
+        accessible(RV_M2, readings[:, :4], rules)
 
 
 def test_a_pool_obeys_its_box_and_rules():

@@ -303,6 +303,18 @@ WRONG = {
         ),
         'column "x" holds "1j" in row 1',
     ),
+    "a calibration in words": (
+        lambda r, d, c: api.Calibration.from_bytes("arm.calib", where="here"),
+        "content of a calibration file is of type str. Bytes are needed",
+    ),
+    "a bound that no float holds": (
+        lambda r, d, c: api.Limits(largest_mm=10**400),
+        "largest_mm is beyond 1.8e",
+    ),
+    "a time that no float holds": (
+        lambda r, d, c: streams.CorrectionStream(api.Compensator(c)).step(None, 10**400),
+        "elapsed_s is beyond 1.8e",
+    ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),
         'convention: "craig" is not known. Either standard or modified',
@@ -315,6 +327,32 @@ def test_wrong_arguments_are_told_what_is_needed(case, robot, data, calibration)
     call, words = WRONG[case]
     with pytest.raises(ta.InputError, match=words):
         call(robot, data, calibration)
+
+
+@pytest.mark.parametrize("kind", [bytearray, memoryview])
+def test_the_content_of_a_calibration_may_be_any_bytes(kind, calibration):
+    content = calibration.to_bytes()
+    again = ta.Calibration.from_bytes(kind(content), where="a message")
+    assert (again.to_bytes(), type(again.file)) == (content, bytes)
+
+
+def test_what_a_calibration_says_is_read_only(calibration, data):
+    model, rows = calibration.models["constant"], calibration.rows
+    arrays = [model.constants, calibration.constant.covariance, calibration.constant.standard_errors]
+    arrays += [rows.weight, rows.residual, calibration.held.readings, calibration.measured.rows]
+    assert not any(array.flags.writeable for array in arrays)
+    with pytest.raises(ValueError, match="read-only"):
+        model.constants[0, 1] += 0.01
+
+
+def test_a_compensator_keeps_what_it_was_made_of(calibration, warm, data):
+    moving = [1, 2, 3]
+    few = ta.Compensator(calibration, task="position", moving=moving)
+    before = few.joints(data.readings).q
+    moving.append(4)
+    assert few.moving_count == 3
+    np.testing.assert_array_equal(sent(few).joints(data.readings).q, before)
+    assert ta.Compensator(warm, features={"temperature_C": 22.0}).features == (22.0,)
 
 
 def test_one_file_is_read_as_a_list_of_one(data, tmp_path):

@@ -139,6 +139,18 @@ def test_what_results_cannot_be_written_to_is_told(out: Any, message: str) -> No
         Robot.load("ur5").parameter_jacobian(np.zeros(6), pose=True, out=out)
 
 
+def test_results_are_not_written_over_the_readings() -> None:
+    robot = Robot.load("ur5")
+    readings = np.random.default_rng(5).uniform(-1, 1, (4, 6))
+    held, before = readings.reshape(-1)[:12].reshape(4, 3), readings.copy()
+    with pytest.raises(InputError, match="shares memory.*in memory of its own"):
+        robot.position(readings, out=held)
+    np.testing.assert_array_equal(readings, before)
+    anywhere = np.zeros(4 * 3 * 8 + 1, dtype=np.uint8)[1:].view(np.float64).reshape(4, 3)
+    with pytest.raises(InputError, match="out is not aligned"):
+        robot.position(readings, out=anywhere)
+
+
 @pytest.mark.parametrize(
     ("q", "message"),
     [

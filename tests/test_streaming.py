@@ -96,8 +96,14 @@ def test_it_is_switched_off_and_on(compensator, home):
 
 
 def test_options_that_bound_nothing_are_refused(compensator):
-    with pytest.raises(ta.UsageError, match="it must be positive"):
-        CorrectionStream(compensator, StreamOptions(ramp_s=0.0))
+    with pytest.raises(ta.UsageError, match="ramp_s: 0. It must be positive"):
+        StreamOptions(ramp_s=0.0)
+    with pytest.raises(ta.UsageError, match="ramp_s: inf. It must be positive and finite"):
+        StreamOptions(ramp_s=np.inf)
+    with pytest.raises(ta.UsageError, match="rate_deg_s: -1. It must be positive. inf switches it off"):
+        StreamOptions(rate_deg_s=-1)
+    unbounded = StreamOptions(rate_deg_s=np.inf, acceleration_deg_s2=np.inf)
+    assert CorrectionStream(compensator, unbounded).last.q is None
 
 
 @pytest.fixture(scope="module")
@@ -132,9 +138,11 @@ def test_features_change_while_it_runs(warm, home):
     assert held.q == pytest.approx(later, abs=1e-6)
 
 
-@pytest.mark.parametrize("wrong", [{"temperature": 20.0, "temp": 20.0}, {"temperature": "20"}])
+@pytest.mark.parametrize(
+    "wrong", [{"temperature": 20.0, "temp": 20.0}, {"temperature": "20"}, {"temperature": 10**400}]
+)
 def test_features_that_are_none_change_nothing(warm, wrong):
     stream = CorrectionStream(warm)
-    with pytest.raises(ta.UsageError, match="is no feature of the calibration|must be a number"):
+    with pytest.raises(ta.UsageError, match="is no feature of the calibration|must be a number|is beyond"):
         stream.set_features(wrong)
     assert stream.features == {"temperature": 16.0}

@@ -1,6 +1,6 @@
 """Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,7 +39,9 @@ class Fault(NamedTuple):
 
 
 def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
-    """`values` as a C-contiguous array, NaN where a masked array hides them; `what` they are is for messages.
+    """`values` as a C-contiguous, aligned array, NaN where a masked array hides them; `what` is for messages.
+
+    Numbers that stand at any byte of a packet, or in a packed record, are copied.
 
     Raises:
         InputError: If these are no real numbers, or rows of different lengths.
@@ -50,7 +52,8 @@ def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
             raise TypeError(f"{NO_REAL_NUMBERS[given.dtype.kind]} were given")
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)
-        return np.ascontiguousarray(given, dtype=np.float64)
+        numbers = np.ascontiguousarray(given, dtype=np.float64)
+        return numbers if numbers.flags.aligned else numbers.copy()
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what} are not real numbers: {error}") from None
 
@@ -95,8 +98,8 @@ def check_finite(rows: NDArray[np.float64], *, what: str) -> None:
         )
 
 
-def check_out(out: object, *shape: int) -> None:
-    """Raise InputError unless `out` is None, or an array of `shape` that results can be written to."""
+def check_out(out: object, *shape: int, given: NDArray[np.float64]) -> None:
+    """Raise InputError unless `out` is None, or takes results of `shape` while `given` is read."""
     if out is None:
         return
     if not isinstance(out, np.ndarray):
@@ -106,12 +109,16 @@ def check_out(out: object, *shape: int) -> None:
     elif out.shape != shape:
         found = f"has shape {out.shape}"
     elif not out.flags.carray:
-        found = "is read-only" if not out.flags.writeable else "is not C-contiguous"
+        contiguous = "is not aligned" if out.flags.c_contiguous else "is not C-contiguous"
+        found = contiguous if out.flags.writeable else "is read-only"
+    elif np.may_share_memory(out, given):
+        found = "shares memory with what it is worked out from"
     else:
         return
     raise InputError(
         f"out {found}",
-        rule=f"It must be a writable array of float64 with shape {shape}, its rows one after another",
+        rule=f"It must be a writable array of float64 with shape {shape}, its rows one after another, in "
+        "memory of its own",
         way_out=f"Make it with np.empty({shape})",
     )
 
@@ -121,6 +128,22 @@ def frozen(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     array = np.array(values, dtype=np.float64).reshape(shape)
     array.flags.writeable = False
     return array
+
+
+def read_only(values: NDArray[Any]) -> NDArray[Any]:
+    """An array that nothing changes: itself where it is read-only, else a copy."""
+    if not values.flags.writeable:
+        return values
+    copied = values.copy()
+    copied.flags.writeable = False
+    return copied
+
+
+def hold_read_only(record: object, *names: str) -> None:
+    """Make arrays of a frozen dataclass, those that are not None, its own and read-only, in __post_init__."""
+    for name in names:
+        if (values := getattr(record, name)) is not None:
+            object.__setattr__(record, name, read_only(values))
 
 
 def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64], bool]:

@@ -29,7 +29,7 @@ from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.inputs import Features, feature_columns
 from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.validation import Validation
-from truearm.kinds import words
+from truearm.kinds import content_bytes, words
 from truearm.lengths import length_mm
 from truearm.limits import Task
 from truearm.revision import Revision
@@ -45,6 +45,8 @@ Floats = NDArray[np.float64]
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """Identified parameters of an arm. SI units; parameters in the order links, theta, d, a, alpha, beta.
+
+    `calibrate`, `load` and `from_bytes` make one.
 
     Joint readings `q` are (n, N), or (N,) for one, and results have the same leading dimension. Where the
     calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
@@ -110,10 +112,15 @@ class Calibration:
         return cls.from_bytes(read_calibration(as_path(path)), where=str(path))
 
     @classmethod
-    def from_bytes(cls, data: bytes, *, where: str) -> "Calibration":
-        """The calibration of a file's content; `where` is named in errors, which are those of `load`."""
-        arrays, content = parse_calibration(data, where)
-        return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
+    def from_bytes(cls, data: bytes | bytearray | memoryview, *, where: str) -> "Calibration":
+        """The calibration of a file's content; `where` is named in errors, which are those of `load`.
+
+        Raises:
+            UsageError: If these are no bytes.
+        """
+        file = content_bytes(data, "the content of a calibration file")
+        arrays, content = parse_calibration(file, where)
+        return cls(**calibration_content.unpack(arrays, content, where=where), file=file)
 
     def __repr__(self) -> str:
         joints, judged = self.robot.joint_count, self.validation
@@ -133,15 +140,8 @@ class Calibration:
         """This one as a file without the measurements holds it, with the bounds of the standard deviation."""
         bounds = self.conservative if self.has_conservative else None
         revision = None if self.revision is None else self.revision.stripped()
-        return replace(
-            self,
-            rows=None,
-            held=None,
-            file=None,
-            fitted_spread=None,
-            stored_conservative=bounds,
-            revision=revision,
-        )
+        left_out: dict[str, Any] = dict.fromkeys(("rows", "held", "file", "fitted_spread"))
+        return replace(self, stored_conservative=bounds, revision=revision, **left_out)
 
     def save(self, path: str | Path, *, with_rows: bool = True) -> None:
         """Write a calibration file, completely or not at all.
@@ -358,8 +358,7 @@ class Calibration:
         """Whether bounds of the standard deviation are there or can be worked out."""
         if self.scheme is not None:
             return False
-        known = self.stored_conservative is not None or self.rows is not None
-        return known or self.variable is None
+        return self.stored_conservative is not None or self.rows is not None or self.variable is None
 
     @cached_property
     def conservative(self) -> Conservative:
@@ -374,7 +373,7 @@ class Calibration:
     def pose_variances(
         self, q: ArrayLike, tool: ArrayLike | None, features: Features | None
     ) -> tuple[Floats, Floats, Floats]:
-        """Inputs (n, I) of readings, and variances (n, 6) of a tool's pose: now, and before any measurement.
+        """Internal: inputs (n, I) of readings, variances (n, 6) of a tool's pose now and before measuring.
 
         They are in the base frame, m^2 and rad^2.
         """
@@ -464,7 +463,7 @@ class Calibration:
         return as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
 
     def field_inputs(self, rows: Floats, features: Features | None) -> Floats:
-        """Inputs (n, I) of the field at readings (n, N): joint values, then features."""
+        """Internal: inputs (n, I) of the field at readings (n, N), joint values and then features."""
         columns = feature_columns(features, self.options.features, len(rows))
         values = self.robot.values_of(rows)
         return np.hstack([values, columns]) if columns.shape[1] else values

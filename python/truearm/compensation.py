@@ -24,6 +24,7 @@ from truearm.solving import (
     core_options,
     feature_names,
     feature_values,
+    moving_joints,
     plain_model,
 )
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
@@ -132,8 +133,8 @@ class Compensator:
         self.task: Task = task
         self.limits = required(limits or Limits(), Limits, "the limits")
         self._check_joints(self.programming)
-        self._moving = moving
-        self._options = core_options(calibration.robot, task, moving, self.limits)
+        self._moving = moving_joints(calibration.robot, moving)
+        self._options = core_options(calibration.robot, task, self._moving, self.limits)
         self._features = feature_values(calibration, features)
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
@@ -225,7 +226,7 @@ class Compensator:
         return feature_names(self.calibration)
 
     @property
-    def features(self) -> list[float]:
+    def features(self) -> tuple[float, ...]:
         """Values of the features that the calibration depends on, in its order."""
         return self._features
 
@@ -235,7 +236,7 @@ class Compensator:
         return dict(zip(self.feature_names, self._features, strict=True))
 
     def corrector(self, tool: ArrayLike | None = None) -> Corrector:
-        """The core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
+        """Internal: the core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
         return self._corrector(self._tool(tool))
 
     def _check_joints(self, programming: Robot) -> None:

@@ -83,6 +83,8 @@ class EvaluationOptions:
 class Evaluation:
     """Errors on other measurements.
 
+    `evaluate` makes one.
+
     Attributes:
         n_frame: Rows that found what was not kept.
         n_frame_poses: How many poses they are of: shots of the same pose count once.

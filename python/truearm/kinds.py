@@ -1,6 +1,7 @@
 """Arguments of the public calls: whether they are what is needed, and options given in two ways."""
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
@@ -140,6 +141,23 @@ def words(value: object, name: str) -> tuple[str, ...]:
     return tuple(str(part) for part in found)
 
 
+def content_bytes(content: object, noun: str) -> bytes:
+    """The bytes of a file's content, which may be a bytearray or a memoryview; `noun` is what it is.
+
+    Raises:
+        UsageError: If it is anything else.
+    """
+    if isinstance(content, bytes):
+        return content
+    if isinstance(content, bytearray | memoryview):
+        return bytes(content)
+    raise UsageError(
+        f"{noun} is of type {type(content).__name__}",
+        rule="Bytes are needed",
+        way_out="Read the file as bytes, or load it by its path",
+    )
+
+
 def count(value: object, name: str) -> int:
     """The argument or option `name`, which is a whole number from zero on.
 
@@ -172,11 +190,16 @@ def _flag(value: object, name: str) -> bool:
 def check_number(value: object, name: str, kind: type = Real) -> None:
     """Raise UsageError unless the argument or option `name` is a number, of `kind` Integral a whole one.
 
-    True and False are none.
+    True and False are none, nor is what no float can hold.
     """
     if isinstance(value, bool) or not isinstance(value, kind):
         words = "a whole number" if kind is Integral else "a number"
         raise UsageError(f"{name} is {value!r}", rule=f"It must be {words}")
+    try:
+        float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        largest = f"{sys.float_info.max:.2g}"
+        raise UsageError(f"{name} is beyond {largest}", rule=f"It must be at most {largest}") from None
 
 
 def chosen(

@@ -62,7 +62,7 @@ class Limits:
                 )
 
     def core(self, robot: Robot) -> dict[str, Any]:
-        """The keywords of the core, SI, for an arm."""
+        """Internal: the keywords of the core, SI, for an arm."""
         mm, mrad = 1.0 / MM_PER_METRE, 1.0 / MRAD_PER_RAD
         return {
             "joints": np.array(robot.limits) if self.joint_limits else np.empty((0, 2)),

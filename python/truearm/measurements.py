@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers, as_row_numbers
+from truearm.arrays import as_numbers, as_row_numbers, read_only
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import required
@@ -50,6 +50,8 @@ GROUPS_SHOWN: Final = 3
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurements:
     """n poses of an N-joint arm and what was measured there. SI units; world is the device's frame.
+
+    `read_csv`, `read_touches`, `read_files`, `from_dataframe` and `concatenate` make one.
 
     Attributes:
         readings: Joint readings (n, N), rad or m.
@@ -100,7 +102,7 @@ class Measurements:
         if not self.joint_units:
             object.__setattr__(self, "joint_units", ("",) * self.joint_count)
         if self.tables is None and self.default_group is not None:
-            object.__setattr__(self, "tables", _frozen(identities(self)))
+            object.__setattr__(self, "tables", read_only(identities(self)))
 
     def _freeze(self) -> None:
         """Check that arrays and features have a row for each pose, and make them own and read-only."""
@@ -108,7 +110,7 @@ class Measurements:
             value = getattr(self, name)
             if value is not None or name not in OPTIONAL:
                 array = _as_array(name, value)
-                object.__setattr__(self, name, _frozen(array))
+                object.__setattr__(self, name, read_only(array))
                 self._check_length(name, array)
         self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
         object.__setattr__(self, "features", self.features.reset_index(drop=True))
@@ -361,13 +363,13 @@ class Measurements:
         return np.asarray(np.isfinite(points).all(axis=-1))
 
     def most_held(self, among: Sequence[int] | None = None) -> int:
-        """The target, an index from 0, that most rows hold, of all or `among` some."""
+        """Internal: the target, an index from 0, that most rows hold, of all or `among` some."""
         places = list(range(self.target_count)) if among is None else list(among)
         held = self.seen(places).sum(axis=0)
         return places[int(held.argmax())]
 
     def row_names(self, mask: NDArray[np.bool_]) -> str:
-        """The rows of a mask (n,) in words, by their numbers in their files."""
+        """Internal: the rows of a mask (n,) in words, by their numbers in their files."""
         chosen = self.select(mask)
         parts = [(file, list_rows(chosen.rows[chosen.sources == file].tolist())) for file in chosen.files]
         if len(self.files) == 1:
@@ -375,7 +377,7 @@ class Measurements:
         return "; ".join(f"{rows} of {file}" for file, rows in parts)
 
     def require_joint_count(self, count: int | None) -> None:
-        """Raise InputError unless there are `count` joints; None asks for nothing."""
+        """Internal: raise InputError unless there are `count` joints; None asks for nothing."""
         if count is not None and self.joint_count != count:
             zero = next((name for name in self.features if re.fullmatch("q0(_[a-z]+)?", str(name))), None)
             raise InputError(
@@ -389,7 +391,7 @@ class Measurements:
             )
 
     def content(self) -> pd.DataFrame:
-        """Everything that was read (n, ...): a column for each number and name, features under their own."""
+        """Internal: all that was read, a column for each number and name, features under their own."""
         columns: dict[str, NDArray[np.generic]] = {}
         for name in CONTENT:
             value = getattr(self, name)
@@ -453,15 +455,6 @@ def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind not in "iu":
         raise InputError(f"values of type {array.dtype}", where=name, rule="They must be whole numbers")
     return array.astype(np.int64, copy=False)
-
-
-def _frozen(values: NDArray[Any]) -> NDArray[Any]:
-    """An array that nothing changes: itself where it is read-only, else a copy."""
-    if not values.flags.writeable:
-        return values
-    copied = values.copy()
-    copied.flags.writeable = False
-    return copied
 
 
 def _padded_targets(parts: Sequence[Measurements]) -> Floats:

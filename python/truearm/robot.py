@@ -226,14 +226,14 @@ class Robot(RobotData):
     def position(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """Tool points in the base frame, m: (n, 3) for readings `q` (n, N), (3,) for (N,)."""
         rows, single = self._readings(q)
-        target = _target(out, len(rows), 3, single=single)
+        target = _target(out, rows, 3, single=single)
         result = self.chain.position(self.values_of(rows), out=target)
         return result[0] if single else result
 
     def pose(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """base_from_tool: (n, 4, 4) for readings `q` (n, N), (4, 4) for (N,)."""
         rows, single = self._readings(q)
-        target = _target(out, len(rows), 4, 4, single=single)
+        target = _target(out, rows, 4, 4, single=single)
         result = self.chain.pose(self.values_of(rows), out=target)
         return result[0] if single else result
 
@@ -249,7 +249,7 @@ class Robot(RobotData):
             (n, 3, 5 N), or (n, 6, 5 N) with translation first; without n for one reading.
         """
         rows, single = self._readings(q)
-        target = _target(out, len(rows), 6 if pose else 3, 5 * self.joint_count, single=single)
+        target = _target(out, rows, 6 if pose else 3, 5 * self.joint_count, single=single)
         result = self.chain.parameter_jacobian(self.values_of(rows), pose=pose, out=target)
         return result[0] if single else result
 
@@ -286,7 +286,7 @@ class Robot(RobotData):
         return as_rows(q, self.joint_count, what=f"joint readings of {self.name}")
 
     def values_of(self, readings: Floats) -> Floats:
-        """Joint values (n, N) of readings (n, N) that were checked."""
+        """Internal: joint values (n, N) of readings (n, N) that were checked."""
         return np.ascontiguousarray(readings @ self.coupling.T) if self.is_coupled else readings
 
     @cached_property
@@ -302,7 +302,7 @@ def _source(chain: UrdfChain, where: str) -> str:
     return f"{ends}; its right angles are rounded, by up to {MRAD_PER_RAD * chain.rounded_rad:.2g} mrad"
 
 
-def _target(out: Floats | None, *shape: int, single: bool) -> Floats | None:
-    """What results of `shape` are written to, where `out` is given; without the first dimension for one."""
-    check_out(out, *(shape[1:] if single else shape))
+def _target(out: Floats | None, rows: Floats, *shape: int, single: bool) -> Floats | None:
+    """What results (n, *shape) of rows (n, N) are written to, where `out` is given; without n for one."""
+    check_out(out, *(shape if single else (len(rows), *shape)), given=rows)
     return out[None] if single and out is not None else out

@@ -61,35 +61,51 @@ def calibrated_model(calibration: "Calibration") -> ArmModel:
     )
 
 
-def core_options(robot: Robot, task: Task, moving: Sequence[int] | None, limits: Limits) -> dict[str, Any]:
-    """The core's options, with joints counted from 0.
+def moving_joints(robot: Robot, moving: Sequence[int] | None) -> tuple[int, ...] | None:
+    """Joints that may change, counted from 1; None where all may.
 
     Raises:
-        UsageError: If there is no such task or joint.
+        UsageError: If there is no such joint, or one is named twice.
     """
-    if task not in TASKS:
-        raise UsageError(f'"{task}" is not known', where="task", rule=f"One of {', '.join(TASKS)}")
     if moving is not None and not isinstance(moving, Sequence | np.ndarray):
         raise UsageError(f"{moving!r}", where="moving", rule="A list of joints, counted from 1")
-    joints = None if moving is None else list(moving)
-    known = range(1, robot.joint_count + 1)
-    if joints is not None and (not joints or len(set(joints)) < len(joints) or not set(joints) <= set(known)):
+    if moving is None:
+        return None
+    joints, known = list(moving), range(1, robot.joint_count + 1)
+    if not joints or len(set(joints)) < len(joints) or not set(joints) <= set(known):
         raise UsageError(
             f"joints {joints}",
             where="moving",
             rule=f"Some of the joints 1 to {robot.joint_count} of {robot.name}, each once",
         )
-    chosen = None if joints is None else sorted(joint - 1 for joint in joints)
+    return tuple(int(joint) for joint in joints)
+
+
+def core_options(robot: Robot, task: Task, moving: tuple[int, ...] | None, limits: Limits) -> dict[str, Any]:
+    """The core's options, with joints counted from 0.
+
+    Args:
+        robot: The arm.
+        task: What is to be met.
+        moving: Joints that may change, those of `moving_joints`.
+        limits: Bounds.
+
+    Raises:
+        UsageError: If there is no such task.
+    """
+    if task not in TASKS:
+        raise UsageError(f'"{task}" is not known', where="task", rule=f"One of {', '.join(TASKS)}")
+    chosen = None if moving is None else sorted(joint - 1 for joint in moving)
     return {"task": task, "moving": chosen, **limits.core(robot)}
 
 
-def feature_values(calibration: "Calibration", given: Mapping[str, float] | None) -> list[float]:
+def feature_values(calibration: "Calibration", given: Mapping[str, float] | None) -> tuple[float, ...]:
     """The features of a calibration, one number each.
 
     Raises:
         UsageError: If one is missing, or is not needed.
     """
-    return [float(value) for value in feature_columns(given, feature_names(calibration), 1)[0]]
+    return tuple(feature_columns(given, feature_names(calibration), 1)[0].tolist())
 
 
 def feature_names(calibration: "Calibration") -> tuple[str, ...]:

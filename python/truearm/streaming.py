@@ -11,7 +11,7 @@ from truearm.arrays import as_numbers
 from truearm.compensation import Compensator
 from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
 from truearm.errors import InputError, UsageError, list_names
-from truearm.kinds import check_number
+from truearm.kinds import check_number, check_values, settle
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -40,11 +40,18 @@ class StreamOptions:
     deadline_s: float = DEADLINE_S
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            check_number(getattr(self, field.name), field.name)
+        names = [field.name for field in fields(self)]
+        settle(self, numbers=names)
+        check_values(self, positive=("ramp_s",))
+        for name in names:
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise UsageError(
+                    f"{value:g}", where=name, rule="It must be positive", way_out="inf switches it off"
+                )
 
     def core(self) -> dict[str, object]:
-        """The core's options, SI."""
+        """Internal: the core's options, SI."""
         return {
             "rate": [np.radians(self.rate_deg_s), self.rate_mm_s / MM_PER_METRE],
             "acceleration": [np.radians(self.acceleration_deg_s2), self.acceleration_mm_s2 / MM_PER_METRE],

@@ -207,6 +207,8 @@ size_t truearm_joint_count(const truearm_calibration *calibration);
 
 // Number of features, such as temperature, that the calibration needs beside the joints; 0 for most.
 //
+// Wherever features are given, they stand in the order in which calibrating named them, in the units of their columns.
+//
 // # Safety
 // `calibration` is null or was loaded and not freed.
 size_t truearm_feature_count(const truearm_calibration *calibration);

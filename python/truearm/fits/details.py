@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ConstantFit
+from truearm.arrays import hold_read_only
 from truearm.fits.known_scale import KnownScale
 from truearm.lengths import length_mm
 
@@ -41,6 +42,9 @@ class ConstantDetails:
     iterations: int
     reason: str
     scale: KnownScale | None = None
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "covariance", "standard_errors")
 
     @classmethod
     def of(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import hold_read_only
 from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection
 from truearm.fits.fitting import Fits, constant_variances
@@ -56,6 +57,9 @@ class FittedRows:
     moved: Floats | None = None
     progress: Floats | None = None
     orientation: bool = False
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "side", "weight", "residual", "score", "distance_m", "moved", "progress")
 
     def __repr__(self) -> str:
         return f"<FittedRows: {count_of(len(self.side), 'row')}, {count_of(len(self.outliers()), 'outlier')}>"

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import hold_read_only
 from truearm.errors import InputError
 from truearm.fits.core_set import Selection
 from truearm.measurements import Measurements
@@ -34,6 +35,9 @@ class MeasuredParts:
     targets: Counts
     orientations: Counts
     worth: Floats
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "rows", "targets", "orientations", "worth")
 
     @classmethod
     def of(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Field, Setup
+from truearm.arrays import hold_read_only
 from truearm.fits.schemes import Scheme, add_ceps
 
 Floats = NDArray[np.float64]
@@ -36,6 +37,9 @@ class ArmModel:
     setup: Setup
     field: Field | None = None
     scheme: Scheme | None = None
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "constants")
 
     def parameters(self, inputs: Floats) -> Floats:
         """Absolute parameters at inputs (n, I), joint values and features: (n, L, 5)."""

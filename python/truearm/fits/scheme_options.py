@@ -88,14 +88,14 @@ class SchemeOptions:
 
     @property
     def sensor_cells(self) -> tuple[int, ...]:
-        """Sensor cells of each joint."""
+        """Internal: sensor cells of each joint."""
         if self.cells:
             return self.cells
         count = len(self.scheme_joints)
         return (17, 11, 11) if count == len(MAJOR_JOINTS) else (7,) * count
 
     def check_network(self, *, fuzzy: bool) -> None:
-        """Check what a network is made of and trained with: an FCMAC if fuzzy, else a CMAC.
+        """Internal: check what a network is made of and trained with: an FCMAC if fuzzy, else a CMAC.
 
         Raises:
             UsageError: If there is no such network.
@@ -126,7 +126,7 @@ class SchemeOptions:
         _check((self.table or 1) <= MOST_ROWS, "table", f"{self.table}", f"1 to {MOST_ROWS}")
 
     def network(self, *, fuzzy: bool) -> dict[str, Any]:
-        """Options of the core's network: the FCMAC, or the CMAC whose inputs are quantised."""
+        """Internal: options of the core's network: the FCMAC, or the CMAC whose inputs are quantised."""
         return {
             "membership": self.membership if fuzzy else "quantised",
             "sigma": self.sigma_cells,
@@ -136,7 +136,7 @@ class SchemeOptions:
 
     @property
     def training(self) -> dict[str, Any]:
-        """Options of the core's training by (A5), without the columns."""
+        """Internal: options of the core's training by (A5), without the columns."""
         return {
             "rate": self.rate,
             "normalise": self.normalise,

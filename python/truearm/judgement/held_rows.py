@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import hold_read_only
 from truearm.errors import count_of, list_names
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
@@ -36,6 +37,9 @@ class HeldRows:
     rows: NDArray[np.int64]
     sources: NDArray[np.str_]
     errors: Mapping[str, RowErrors]
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "readings", "rows", "sources")
 
     def __repr__(self) -> str:
         return f"<HeldRows: {count_of(len(self), 'row')}, errors of {list_names(self.errors)}>"

@@ -8,10 +8,11 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers
+from truearm.arrays import as_numbers, as_rows
 from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, UsageError
 from truearm.fits.endpoints import at_tool
+from truearm.kinds import check_number, check_values
 from truearm.planning.configurations import link_frames
 from truearm.robot import Robot
 
@@ -19,7 +20,6 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_CONTACT_DEG: Final = 15.0
-STEPS_ALONG_LINK: Final = 8
 UPRIGHT: Final = np.cos(np.deg2rad(1.0))
 LEVEL: Final = np.sin(np.deg2rad(1.0))
 """Cosines to the vertical of axes that are taken for vertical and for level."""
@@ -63,14 +63,6 @@ class Places:
         """Heights (n,) of the lowest place beyond the links that stand on the floor themselves, m."""
         return np.asarray(self.corners[:, standing_links(self.robot) :, 2].min(axis=1))
 
-    @cached_property
-    def arm_points(self) -> Floats:
-        """Points (n, k, 3) along the straight lines between the frames of the links and the tool."""
-        line = self.corners
-        part = np.linspace(0.0, 1.0, STEPS_ALONG_LINK)[:, None]
-        pieces = line[:, :-1, None] * (1.0 - part) + line[:, 1:, None] * part
-        return np.asarray(pieces.reshape(len(line), -1, 3))
-
 
 @lru_cache(maxsize=8)
 def standing_links(robot: Robot) -> int:
@@ -93,9 +85,9 @@ Rule = Callable[[Places], Mask]
 
 
 def accessible(
-    robot: Robot, readings: Floats, rules: Iterable[Rule], *, tool: ArrayLike | None = None
+    robot: Robot, readings: ArrayLike, rules: Iterable[Rule], *, tool: ArrayLike | None = None
 ) -> Mask:
-    """Which of readings (n, N) every rule allows, (n,).
+    """Which of readings (n, N), or (N,) for one, every rule allows, (n,).
 
     Args:
         robot: The nominal arm.
@@ -104,13 +96,15 @@ def accessible(
         tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
 
     Raises:
-        InputError: If a rule answers with another shape than (n,), or the tool is none.
+        InputError: If the readings are none, a rule answers with another shape than (n,), or the tool is
+            none.
     """
+    poses, _ = as_rows(readings, robot.joint_count, what=f"joint readings of {robot.name}")
     flange_from_tool = at_tool(robot, tool)
-    allowed = np.ones(len(readings), dtype=np.bool_)
+    allowed = np.ones(len(poses), dtype=np.bool_)
     for rule in rules:
         rows = np.flatnonzero(allowed)
-        answer = np.asarray(rule(Places(robot, readings[rows], flange_from_tool)))
+        answer = np.asarray(rule(Places(robot, poses[rows], flange_from_tool)))
         if answer.shape != rows.shape:
             raise InputError(
                 f"a rule of accessibility answered with shape {answer.shape}",
@@ -144,12 +138,7 @@ class InBox:
     high: ArrayLike
 
     def __post_init__(self) -> None:
-        low, high = (as_numbers(side, what="the sides of a box") for side in (self.low, self.high))
-        if low.shape != (3,) or high.shape != (3,) or not (low <= high).all():
-            raise UsageError(
-                f"a box from {low.tolist()} to {high.tolist()}",
-                rule="x, y and z in m, the lowest and then the highest",
-            )
+        _check_box(self.low, self.high)
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -222,7 +211,9 @@ class LeastContactAngle:
 class KeepOut:
     """No part of the arm is in a box in the base frame, from `low` to `high` (3,), m.
 
-    The arm is taken as straight lines between the frames of its links, `margin_m` thick on every side.
+    The arm is taken as straight lines between the frames of its links, from the base's to the tool: the box,
+    `margin_m` wider on every side, meets none of them. On ways the arm is looked at in steps, of one degree
+    where joints turn: the margin has to leave room for half of what the arm moves in one.
     """
 
     low: ArrayLike
@@ -231,11 +222,33 @@ class KeepOut:
 
     holds_on_ways: ClassVar[bool] = True
 
+    def __post_init__(self) -> None:
+        _check_box(self.low, self.high)
+        check_number(self.margin_m, "margin_m")
+        check_values(self, not_negative=("margin_m",))
+
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
+        begins, ends = places.corners[:, :-1], places.corners[:, 1:]
         low, high = np.asarray(self.low) - self.margin_m, np.asarray(self.high) + self.margin_m
-        inside = ((places.arm_points >= low) & (places.arm_points <= high)).all(axis=2)
-        return np.asarray(~np.logical_or.reduce(inside, axis=1))
+        return np.asarray(~pieces_meet_box(begins, ends, low, high).any(axis=1))
+
+
+def pieces_meet_box(begins: Floats, ends: Floats, low: Floats, high: Floats) -> Mask:
+    """Which straight pieces from begins to ends (..., 3) share a point with the box from low to high (3,).
+
+    Each pair of sides leaves a part of a piece between them: it meets the box where the three parts overlap
+    (Kay and Kajiya, Ray Tracing Complex Scenes, 1986).
+    """
+    way = ends - begins
+    moves = way != 0.0
+    beside = ~moves & ~((begins >= low) & (begins <= high))
+    with np.errstate(over="ignore"):
+        to_low = np.divide(low - begins, way, out=np.full_like(way, -np.inf), where=moves)
+        to_high = np.divide(high - begins, way, out=np.full_like(way, np.inf), where=moves)
+    enters = np.minimum(to_low, to_high).max(axis=-1, initial=0.0)
+    leaves = np.maximum(to_low, to_high).min(axis=-1, initial=1.0)
+    return np.asarray((enters <= leaves) & ~beside.any(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -273,6 +286,16 @@ def either(*rules: Rule) -> Rule:
         return np.asarray(np.logical_or.reduce([rule(places) for rule in rules]))
 
     return any_of
+
+
+def _check_box(low: ArrayLike, high: ArrayLike) -> None:
+    """Raise UsageError unless these are the corners (3,) of a box."""
+    least, most = (as_numbers(side, what="the sides of a box") for side in (low, high))
+    if least.shape != (3,) or most.shape != (3,) or not (least <= most).all():
+        raise UsageError(
+            f"a box from {least.tolist()} to {most.tolist()}",
+            rule="x, y and z in m, the lowest and then the highest",
+        )
 
 
 def _angle(vectors: Floats, others: Floats) -> Floats:

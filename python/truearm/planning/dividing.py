@@ -75,7 +75,7 @@ class DivisionOptions:
             )
 
     def core(self, low: Floats, high: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The core's options of the division, and of its measuring."""
+        """Internal: the core's options of the division, and of its measuring."""
         division = {
             "low": low,
             "high": high,

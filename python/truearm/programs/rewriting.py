@@ -118,6 +118,8 @@ class Choices:
 class Rewritten:
     """A program with corrected targets.
 
+    `compensate_program` makes one.
+
     Attributes:
         program: The program as it was.
         contents: The bytes of its files now.

@@ -57,6 +57,8 @@ IMPLAUSIBLE: Final = 5.0
 class Update:
     """What new measurements say about an old calibration.
 
+    `update` makes one.
+
     Attributes:
         calibration: With offsets, frames and tools estimated again; the old one is kept in it.
         verdict: "holds": the old calibration still does. "moved": offsets, tool or the base of a known

@@ -100,6 +100,8 @@ pub unsafe extern "C" fn truearm_joint_count(calibration: *const Calibration) ->
 
 /// Number of features, such as temperature, that the calibration needs beside the joints; 0 for most.
 ///
+/// Wherever features are given, they stand in the order in which calibrating named them, in the units of their columns.
+///
 /// # Safety
 /// `calibration` is null or was loaded and not freed.
 #[unsafe(no_mangle)]
