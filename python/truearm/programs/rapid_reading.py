@@ -1,7 +1,7 @@
 """Reading RAPID: first what is declared, then the motions in their order."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -20,6 +20,14 @@ from truearm.programs.rapid_configuration import Confdata
 from truearm.programs.rapid_confs import KINDS, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
+from truearm.programs.rapid_instructions import (
+    COUNTING,
+    HARMLESS,
+    INSTRUCTIONS,
+    MOVING,
+    Instruction,
+    motions_named,
+)
 from truearm.programs.rapid_routines import BEGINNINGS, ENDINGS, given, is_variable
 from truearm.programs.rapid_targets import Meant, RapidTargets
 from truearm.programs.rapid_values import (
@@ -45,65 +53,6 @@ HANDLER: Final = re.compile(
 )
 """What may be executed between any two motions."""
 DISPLACEMENT: Final = re.compile(r"\b(?:pdisp|eoffs)(?:set|on)\b", re.IGNORECASE)
-STRAIGHT: Final = (Motion.LINEAR,)
-ARC: Final = (Motion.VIA, Motion.CIRCULAR)
-
-
-@dataclass(frozen=True)
-class _Instruction:
-    """A motion: how it goes, and where among its arguments zone and tool stand."""
-
-    motions: tuple[Motion, ...]
-    zone: int
-    tool: int
-
-
-def _kinds() -> Mapping[str, _Instruction]:
-    found = {"moveabsj": _Instruction((Motion.JOINT,), 2, 3)}
-    for ending in ("", "do", "ao", "go", "sync"):
-        found[f"movej{ending}"] = _Instruction((Motion.JOINT,), 2, 3)
-        found[f"movel{ending}"] = _Instruction(STRAIGHT, 2, 3)
-        found[f"movec{ending}"] = _Instruction(ARC, 3, 4)
-    found |= {
-        "triggj": _Instruction((Motion.JOINT,), 3, 4),
-        "triggl": _Instruction(STRAIGHT, 3, 4),
-        "triggc": _Instruction(ARC, 4, 5),
-    }
-    for ending in ("", "start", "end"):
-        found[f"arcl{ending}"] = _Instruction(STRAIGHT, 4, 5)
-        found[f"arcc{ending}"] = _Instruction(ARC, 5, 6)
-    return found
-
-
-INSTRUCTIONS: Final = _kinds()
-HARMLESS: Final = frozenset(
-    {
-        "set",
-        "reset",
-        "setdo",
-        "setgo",
-        "setao",
-        "pulsedo",
-        "waittime",
-        "waitdi",
-        "waituntil",
-        "waitrob",
-        "tpwrite",
-        "tperase",
-        "accset",
-        "velset",
-        "singarea",
-        "confj",
-        "confl",
-        "clkstart",
-        "clkstop",
-        "clkreset",
-        "motionsup",
-        "gripload",
-    }
-)
-COUNTING: Final = frozenset({"incr", "decr", "add", "clear"})
-"""Harmless but for what they are given."""
 HANDLERS: Final = frozenset({"error", "undo", "backward"})
 BEGINS: Final = BEGINNINGS | {"module"}
 ENDS: Final = ENDINGS | HANDLERS | {"endmodule", "goto"}
@@ -329,8 +278,8 @@ class RapidReading:
             if word in LEAVING:
                 self._confs.note("leave")
         elif word not in HARMLESS | COUNTING:
-            if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
-                self._list(at, "an instruction that is not known here")
+            if word.startswith(MOVING):
+                self._leave(at, "an instruction that is not known here", motions_named(word))
             else:
                 self._confs.note("call", word)
             self._flow.jump()
@@ -361,19 +310,17 @@ class RapidReading:
             self._flow.state = replace(state, problem=DISPLACED)
         self._mention(found[1:], READ)
 
-    def _motion(self, at: int, instruction: _Instruction, stated: list[Argument]) -> None:
+    def _motion(self, at: int, instruction: Instruction, stated: list[Argument]) -> None:
         """A motion: its targets, with the tool and the work object of the statement."""
         plain = [argument for argument in stated if argument.tokens]
         count = len(instruction.motions)
         if len(plain) <= instruction.tool:
-            self._list(at, "it has fewer arguments than this instruction needs")
-            self._flow.jump()
+            self._leave(at, "it has fewer arguments than this instruction needs", instruction.motions)
             return
         if any("corr" in argument.options for argument in stated):
-            self._list(at, "its path is corrected by sensors (\\Corr)")
+            self._leave(at, "its path is corrected by sensors (\\Corr)", instruction.motions)
             for argument in plain[:count]:
                 self._mention(argument.tokens, READ)
-            self._flow.jump()
             return
         zone = plain[instruction.zone].tokens
         blended = not (len(zone) == 1 and zone[0].text.lower() == "fine")
@@ -389,9 +336,7 @@ class RapidReading:
 
     def _go(self, at: int, motion: Motion, meant: Meant | str, tool: Argument, *, passed: bool) -> None:
         if isinstance(meant, str):
-            self._list(at, meant)
-            self._unplaced.append(Unplaced(0, at, motion, passed))
-            self._flow.jump()
+            self._leave(at, meant, (motion,), passed=passed)
             return
         flow = self._flow
         follows = flow.certain and len(meant.targets) == 1
@@ -403,9 +348,12 @@ class RapidReading:
         if len(meant.targets) > 1:
             flow.jump()
 
-    def _list(self, at: int, reason: str) -> None:
+    def _leave(self, at: int, reason: str, motions: Sequence[Motion], *, passed: bool = True) -> None:
+        """A statement is listed, its motions lead to no targets that are read, and stop unless `passed`."""
         line, column = self._source.place(at)
         self._listed.append(Listed(0, line, column, self._source.line_text(line).strip(), reason))
+        self._unplaced += [Unplaced(0, at, motion, passed) for motion in motions]
+        self._flow.jump()
 
     # At the end.
 

@@ -71,7 +71,6 @@ class Reader:
     Attributes:
         environments: TCPs, payloads and offsets that motions have.
         listed: What is left as it is.
-        unplaced: Motions whose targets are computed when the program runs.
     """
 
     def __init__(self, source: Source, frames: Frames) -> None:
@@ -85,13 +84,17 @@ class Reader:
         self._states = [flow[int(at)] for at in self._offsets]
         self._leaves = _Leaves()
         self._rows = _Rows()
-        self.unplaced: list[Unplaced] = []
         self._slow()
 
     @property
     def listed(self) -> list[Listed]:
         """What is left as it is."""
         return self._found.listed
+
+    @property
+    def unplaced(self) -> list[Unplaced]:
+        """Motions whose targets are not read, as those that are computed when the program runs."""
+        return self._found.unplaced
 
     def tables(self) -> tuple[Targets, Moves]:
         """All targets and moves, in the order of the text."""
@@ -194,8 +197,7 @@ class Reader:
         return found
 
     def _leave(self, motion: MotionCall, name: str, unknown: RunTime) -> None:
-        self._found.leave(motion.at, name, unknown.reason)
-        self.unplaced.append(Unplaced(0, motion.at, motion.motion, motion.blended))
+        self._found.leave(motion.at, name, unknown.reason, motion.motion, blended=motion.blended)
 
     def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]
