@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -41,6 +42,7 @@ _OPTIONS: Final = (
 _MOTIONS: Final = {"J": Motion.JOINT, "L": Motion.LINEAR, "C": Motion.CIRCULAR, "A": Motion.CIRCULAR}
 _POSE: Final = ConfiguredPose()
 LONGEST_NAME: Final = 48
+SHARED: Final = "/POS has its number more than once,"
 ORDER_UNKNOWN: Final = (
     "its turn numbers mean different joints to different controllers, and no joint position of the "
     "same place tells which"
@@ -71,8 +73,9 @@ class Reader:
         self._source, self._robot, self._frames = source, robot, frames
         self._main = section(source, "MN")
         start, end = section(source, "POS")
-        self._positions = {p.number: p for p in positions(source, start, end, robot.joint_count)}
-        self._targets = {number: self._target(p) for number, p in self._positions.items()}
+        stated = self._told_apart(positions(source, start, end, robot.joint_count))
+        self._positions = {p.number: p for p in stated}
+        self._targets = {p.number: self._target(p) for p in stated}
         self._current = Current()
         self._settings()
         self._moved = moved_at(source.part(0, self._main[0]), self._statements())
@@ -93,10 +96,26 @@ class Reader:
                     self.fixed.setdefault(self._targets[number], unsuited.what)
             return None
 
+    def _told_apart(self, stated: Iterable[Position]) -> list[Position]:
+        """Positions; which of those that share a number a controller takes is not known."""
+        found = list(stated)
+        lines: dict[int, list[str]] = {}
+        for position in found:
+            lines.setdefault(position.number, []).append(str(self._source.place(position.at)[0]))
+        shared = {number: " and ".join(every) for number, every in lines.items() if len(every) > 1}
+        return [
+            replace(p, problem=f"{SHARED} in lines {shared[p.number]}", sure=False)
+            if p.number in shared
+            else p
+            for p in found
+        ]
+
     def _target(self, position: Position) -> int:
         number = self.targets.add(0, position.at, position.layout, position.numbers, f"P[{position.number}]")
         if position.problem:
             self.fixed[number] = position.problem
+        if not position.sure:
+            self.unsure.add(number)
         return number
 
     def _statements(self) -> Iterator[tuple[int, str]]:
