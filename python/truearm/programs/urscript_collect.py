@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.programs.environment import Frame
 from truearm.programs.frames import Frames, written_out
-from truearm.programs.program import Listed, Unplaced
+from truearm.programs.gathered import Gathered
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import Constants, RunTime
@@ -60,7 +60,6 @@ HARMLESS: Final = COUNTING | {
 }
 DEFINED: Final = re.compile(rb"\b(?:def|thread|sec)[ \t]+(\w+)")
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
-LONGEST_NAME: Final = 48
 _OPERATORS: Final = ("+", "-", "*", "/", "%", "^")
 TCP: Final = "tcp"
 INSTALLATION: Final = "installation"
@@ -83,8 +82,7 @@ class Collected:
         motions: The other motions.
         constants: Variables.
         elsewhere: Variables used for something else than a motion, and where.
-        listed: Motions without a target.
-        unplaced: Those of them that lead to a place that is not read.
+        found: Motions without a target.
         shifted: Why no target is where it is written; empty if they are.
         breaks: Offsets behind which the arm may come from several places.
     """
@@ -94,8 +92,7 @@ class Collected:
         self.motions: list[MotionCall] = []
         self.constants = Constants()
         self.elsewhere: dict[str, int] = {}
-        self.listed: list[Listed] = []
-        self.unplaced: list[Unplaced] = []
+        self.found = Gathered((source,))
         self.shifted = ""
         self.breaks = array("q")
         self._source = source
@@ -128,12 +125,10 @@ class Collected:
             motion: How the arm goes to a place that is not read; None where it goes to none.
             blended: Whether it does not stop there.
         """
-        line, column = self._source.place(at)
-        shown = name or " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
-        self.listed.append(Listed(0, line, column, shown, reason))
+        self.found.leave((0, at), reason, name)
         self.breaks.extend((at, at + 1))
         if motion is not None:
-            self.unplaced.append(Unplaced(0, at, motion, blended))
+            self.found.unplace((0, at), motion, blended=blended)
 
     def compute(self, node: Node, at: int) -> None:
         """The program computes a motion's target, or its numbers, from the variables in `node`."""
