@@ -212,6 +212,21 @@ def test_work_objects_that_were_not_taught_through_the_calibration_are_told(tmp_
         assert notices_of(path, positions_alone, frames, ["object"]) == []
 
 
+def test_the_controllers_world_is_no_work_object_to_teach(tmp_path, positions_alone):
+    path = tmp_path / "a.mod"
+    world = np.eye(4)
+    world[:3, 3] = [0.05, 0.0, -0.12]
+    wide = numbers(SEEN["pA"], placed=world)
+    path.write_bytes(
+        module(f"MoveJ {wide},v100,fine,tG;\nMoveL {wide},v100,fine,tG\\WObj:=WOBJ0;").encode("latin-1")
+    )
+    frames = "[object.wobj0]\nxyz = [50, 0, -120]\n"
+    assert notices_of(path, positions_alone, frames, ["object"]) == []
+    path.write_bytes(RAPID.encode("latin-1"))
+    (found,) = notices_of(path, positions_alone, frames, ["object"])
+    assert 'work object "wT": not taught' in found.message
+
+
 @pytest.mark.parametrize("body", ["MoveJ pA,v100,fine,tG;", "MoveAbsJ jHome,v100,fine,tG\\WObj:=wT;"])
 def test_the_base_and_joint_targets_have_no_work_object_to_teach(body, tmp_path, positions_alone):
     path = tmp_path / "a.mod"

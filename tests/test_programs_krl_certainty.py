@@ -202,6 +202,32 @@ def test_a_frame_that_may_be_changed_elsewhere(line):
 
 
 @pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("$ROBROOT={X 0,Y 0,Z 120,A 25,B 0,C 0}", "$ROBROOT is set in line "),
+        ("$WORLD.Z=120", "$WORLD is set in line "),
+        ("$ERSYSROOT=FOUND", "$ERSYSROOT is set in line "),
+        ("LEVEL($ROBROOT)", "$ROBROOT is given to a subroutine"),
+    ],
+)
+def test_a_program_that_moves_the_world_leaves_all_that_is_told_in_it(line, told):
+    axes = "PTP {A1 10,A2 -80,A3 95,A4 15,A5 40,A6 20}"
+    bases = f"$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nLIN {HERE}\n$BASE=BASE_DATA[2]\nLIN {THERE}\n"
+    src = f"DEF a()\n$TOOL=$NULLFRAME\n{axes}\n@\n{bases}END\nDEF part()\n%\nEND\n"
+    frames = '[object."$WORLD"]\nxyz=[0,0,-120]\n[object."2"]\nxyz=[1,0,0]\n'
+    assert changed(src.replace("@", "").replace("%", ""), frames=frames) == [True, True, True]
+    for here in (src.replace("@", line).replace("%", ""), src.replace("@", "part()").replace("%", line)):
+        assert changed(here, frames=frames) == [True, False, False]
+        number = line_of(here, line) if told.endswith(" ") else ""
+        assert why(here, frames=frames).count(f"base: {told}{number}, ") == 2
+
+
+def line_of(src, text):
+    """The line where a text stands."""
+    return src.partition(text)[0].count("\n") + 1
+
+
+@pytest.mark.parametrize(
     "line",
     [
         "LIN Above(XP1,50.0)",

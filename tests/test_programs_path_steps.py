@@ -43,6 +43,26 @@ def test_a_motion_to_a_place_that_is_computed_makes_a_step_in_rapid():
 
 
 @pytest.mark.parametrize(
+    ("line", "steps"),
+    [
+        (f"PaintL pC,{STOP}", True),
+        ("SearchC di1,pHere,pC,pD,v100,tG\\WObj:=wT;", True),
+        (f"arcl2 pC,v100,sm1,wd1,{STOP}", True),
+        ("TriggLIOs pC,v100\\TriggData1:=tr,fine,tG\\WObj:=wT;", True),
+        ("MoveL\\Conc,pC,v100,fine,tG\\WObj:=wT\\Corr;", True),
+        ("MoveL pC,v100;", True),
+        ("MoveExtJ jHome,v100,fine;", False),
+        ("SearchExtJ di1,jPos,jHome,v100;", False),
+        ("TriggCheckIO tr,5,di1,EQ,1,irq;", False),
+        ("MoveHome;", False),
+    ],
+)
+def test_a_motion_that_is_not_known_makes_a_step_in_rapid(line, steps):
+    body = f"MoveJ pA,{STOP}\n{line}\nMoveJ pB,{STOP}"
+    assert rapid(body) == ([2] if steps else None)
+
+
+@pytest.mark.parametrize(
     "body",
     [
         f"MoveJ pA,{STOP}\nMoveJ fPos(1),{STOP}\nMoveJ pB,{STOP}",
@@ -88,6 +108,25 @@ def test_a_target_that_is_computed_makes_a_step_in_urscript():
     assert warned(rewritten_text(UR, text, robot, by=1e-3)) == (3,)
     assert warned(rewritten_text(UR, text.replace("movel", "movej"), robot, by=1e-3)) is None
     assert read_text(UR, f"{TCP}movel({pose_text(AWAY)})\n", robot).unplaced == []
+
+
+@pytest.mark.parametrize(
+    ("line", "steps"),
+    [
+        (f"optimovel({pose_text(HOME)})", True),
+        (f"r = movel({pose_text(HOME)})", True),
+        (f"if movec({pose_text(HOME)}, {pose_text(HOME)}):\nend", True),
+        (f"r = servoj({HOME})", True),
+        (f"optimovej({HOME})", False),
+        (f"r = movej({HOME})", False),
+        ("speedl([0, 0, 0.1, 0, 0, 0], 0.5, 1)", False),
+    ],
+)
+def test_a_motion_that_is_not_followed_makes_a_step_in_urscript(line, steps):
+    text = f"{TCP}movej({HOME})\n{line}\nmovej({AWAY})\n"
+    done = rewritten_text(UR, text, Robot.load("ur10e"), by=1e-3)
+    assert [one.line for one in done.listed] == [3]
+    assert warned(done) == ((3,) if steps else None)
 
 
 def test_a_target_that_is_computed_makes_a_step_in_krl():

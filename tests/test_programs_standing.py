@@ -15,6 +15,7 @@ from tests.test_programs_tp import TP, off, pose, program
 from tests.test_programs_tp import joints as fanuc_joints
 from tests.test_programs_urscript import UR, pose_text
 from truearm.programs.csv_path import CsvPath
+from truearm.programs.solving import UNKNOWN_BEFORE
 from truearm.programs.tables import NOWHERE
 from truearm.robot import Robot
 
@@ -121,6 +122,24 @@ def test_a_seed_behind_a_jump_tells_the_solution_and_not_the_place(universal):
     moves = read(UR, text, universal).moves
     assert moves.before.tolist() == [NOWHERE] * 3
     assert moves.near.tolist() == [NOWHERE, NOWHERE, moves.target[1]]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "while True:\n  {}\nend",
+        "if get_standard_digital_in(0):\n  halt\nelse:\n  {}\nend",
+        "go()\n{}",
+        "movel(get_target_tcp_pose())\n{}",
+    ],
+)
+def test_a_pose_behind_a_place_that_is_not_known_says_so(universal, lines):
+    pose = f"movel(p[{pose_text(universal, LAST, tool=(0, 0, 0))}])"
+    head = f"set_tcp(p[0,0,0,0,0,0])\ndef go():\n  movej({joints(HOME)})\nend\nmovej({joints(FIRST)})\n"
+    done = rewritten(UR, head + lines.format(pose), universal, by=1e-3)
+    assert done.listed[-1].reason == UNKNOWN_BEFORE
+    assert "a loop, a branch, a call" in UNKNOWN_BEFORE
+    assert rewritten(UR, f"{head}{pose}\n", universal, by=1e-3).listed == ()
 
 
 def test_an_arc_with_an_angle_ends_elsewhere():

@@ -137,3 +137,14 @@ def test_waypoints_end_their_lines_as_the_listing_does(robot):
     done = rewritten(TP, text.replace("\n", "\r"), robot, by=Bend(), spacing=FINE_STEPS)
     assert done.inserted >= 2
     assert done.contents[0] == plain.contents[0].replace(b"\n", b"\r")
+
+
+def test_a_number_that_positions_share_tells_none_of_them(robot):
+    places = [pose(robot, 2, Q[0]), joints(1, Q[0]), joints(2, Q[0]), joints(3, Q[0])]
+    text = program([f"J P[{number}] 10% FINE" for number in (1, 2, 3)], places)
+    done = rewritten(TP, text, robot, by=SHIFT)
+    assert names_changed(done) == ["P[1]", "P[3]"]
+    lines = [number for number, line in enumerate(text.splitlines(), 1) if line.startswith("P[2]")]
+    why = f"/POS has its number more than once, in lines {lines[0]} and {lines[1]}"
+    assert reasons(done) == [(line, "P[2]", why) for line in lines]
+    assert done.program.unsure == {0, 2}

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.compensation import Compensator
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
-from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn
@@ -193,7 +193,7 @@ class Densifier:
             tool=environment.tool.true,
             author=author_of(self._robot, environment.tool, displacement),
         )
-        if np.asarray(found.refused).any():
+        if found.refused.any():
             return f"waypoints between are refused: {found.refusals[0].reason}"
         points = self._written(found.q, environment)
         deviation_m = _deviation(points)

@@ -43,7 +43,9 @@ class Frame:
         return cls(np.eye(4), np.eye(4), name, reason)
 
     def then(self, inner: "Frame") -> "Frame":
-        """A frame that is told in this one, told where this one is; with its own name."""
+        """A frame that is told in this one, told where this one is, if both are known; with its own name."""
+        if self.unknown or inner.unknown:
+            return Frame.missing(inner.unknown or self.unknown, inner.name)
         return Frame(
             self.true @ inner.true,
             self.controller @ inner.controller,

@@ -9,10 +9,10 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
-from truearm.programs.configuration import configured
-from truearm.programs.environment import Environment, Environments, Frame
+from truearm.programs.environment import Environment, Frame
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
+from truearm.programs.gathered import Gathered
 from truearm.programs.krl_order import Order, Place
 from truearm.programs.krl_routines import (
     BAS_LEAVING,
@@ -57,11 +57,11 @@ from truearm.programs.krl_values import (
     operands,
     structure,
 )
-from truearm.programs.layouts import EulerPose, Joints, Layout
+from truearm.programs.layouts import EulerPose, Joints
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.program import Listed, Program, Unplaced
+from truearm.programs.program import Program
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, MoveTable, Targets, TargetTable
+from truearm.programs.tables import Motion
 from truearm.robot import Robot
 
 if TYPE_CHECKING:
@@ -122,14 +122,10 @@ class KrlReading:
                 rule="KRL programs are compensated for arms with six revolute axes",
             )
         self._language, self._sources, self._robot = language, sources, robot
-        self._targets, self._moves, self._environments = TargetTable(), MoveTable(), Environments()
-        self._listed: list[Listed] = []
-        self._unplaced: list[Unplaced] = []
-        self._fixed: dict[int, str] = {}
-        self._unsure: set[int] = set()
+        self._found = Gathered(sources)
         self._storage = KrlStorage()
         self._numbers: dict[str, int] = {}
-        self._accurate, self._in_spline, self._interrupting = False, False, False
+        self._in_spline, self._interrupting = False, False
         self._used: list[int | None] = []
         self._calls: dict[str, list[Call]] = {}
         for number in self._data_first():
@@ -147,30 +143,8 @@ class KrlReading:
                 for start, end in lines(source):
                     self._line(number, start, end)
         self._settle()
-        layouts, targets = (Joints.of(self._robot.joints), EulerPose(configuration=2)), self._targets.freeze()
-        return Program(
-            self._language,
-            self._sources,
-            layouts,
-            targets,
-            self._moves.freeze(),
-            tuple(self._environments.all),
-            tuple(sorted(self._listed)),
-            self._configuration(targets, layouts),
-            fixed=self._fixed,
-            unsure=self._unsure,
-            unplaced=self._unplaced,
-            accurate=TAUGHT_ACCURATE if self._accurate else "",
-        )
-
-    def _configuration(self, targets: Targets, layouts: Sequence[Layout]) -> StatusAndTurn | None:
-        """How S and T are meant; None for an arm whose branches nobody can tell by them."""
-        try:
-            return StatusAndTurn(Branches.of(self._robot))
-        except InputError as unsuited:
-            for target in configured(targets, layouts):
-                self._fixed.setdefault(target, unsuited.what)
-            return None
+        layouts = (Joints.of(self._robot.joints), EulerPose(configuration=2))
+        return self._found.program(self._language, layouts, lambda: StatusAndTurn(Branches.of(self._robot)))
 
     def _data_first(self) -> list[int]:
         order = range(len(self._sources))
@@ -195,7 +169,7 @@ class KrlReading:
             at = reader.take().start
             self._motion((file, at), MOTIONS[word], reader, passing=word == "spl")
         elif word in RELATIVE:
-            self._list(file, reader.offset, "a relative move")
+            self._found.leave((file, reader.offset), "a relative move")
             self._storage.read |= names_in(reader.rest())
             self._flow.jump()
         elif ASSIGNING.match(source.text, start, end):
@@ -376,15 +350,17 @@ class KrlReading:
         """Whether there is a move to the target of a chain of operands; a line of the listing otherwise."""
         found = RUN_TIME if chain is None else self._target_among(place[0], chain)
         if isinstance(found, str) or chain is None:
-            self._list(*place, found if isinstance(found, str) else RUN_TIME)
-            self._unplaced.append(Unplaced(*place, motion, blended))
+            self._found.leave(place, found if isinstance(found, str) else RUN_TIME)
+            self._found.unplace(place, motion, blended=blended)
             self._flow.jump()
             return False
         numbers, which = found
-        environment = self._environments.number(self._environment(chain, which))
+        environment = self._found.environments.number(self._environment(chain, which))
         for number in numbers:
             follows = self._flow.certain and len(numbers) == 1
-            self._moves.add(number, place, motion, environment=environment, blended=blended, follows=follows)
+            self._found.moves.add(
+                number, place, motion, environment=environment, blended=blended, follows=follows
+            )
             self._used.append(number)
             self._flow.use(len(self._used) - 1)
         if len(numbers) > 1:
@@ -445,13 +421,9 @@ class KrlReading:
     def _add(self, file: int, value: Structure, name: str) -> int:
         layout = OF_AXES if value.is_axes else OF_POSES
         status = value.numbers.get("s")
-        self._accurate |= status is not None and bool(int(status.value) & ACCURATE)
-        return self._targets.add(file, value.at, layout, value.target(), name)
-
-    def _list(self, file: int, offset: int, reason: str, name: str = "") -> None:
-        source = self._sources[file]
-        line, column = source.place(offset)
-        self._listed.append(Listed(file, line, column, name or source.line_text(line).strip(), reason))
+        if status is not None and int(status.value) & ACCURATE:
+            self._found.accurate = TAUGHT_ACCURATE
+        return self._found.targets.add(file, value.at, layout, value.target(), name)
 
     def _settle(self) -> None:
         """Targets that the program computes with, and those that nothing goes to."""
@@ -462,23 +434,23 @@ class KrlReading:
             if not self._storage.why_not(key):
                 self._number(key)
             elif value is not None:
-                self._list(file, value.at, self._storage.why_not(key), key.upper())
+                self._found.leave((file, value.at), self._storage.why_not(key), key.upper())
         for key, number in self._numbers.items():
             self._settle_one(key, number)
         for use in self._flow.overruled:
             target = self._used[use]
             if target is not None:
-                self._fixed.setdefault(target, ROUND_AGAIN)
+                self._found.keep([target], ROUND_AGAIN)
 
     def _settle_one(self, key: str, number: int) -> None:
         name = key.partition("[")[0]
         if name in self._storage.read:
-            self._fixed.setdefault(number, READ)
+            self._found.keep([number], READ)
         computed = f"{name}[?]" in self._storage.values
         if computed:
-            self._fixed.setdefault(number, COMPUTED)
+            self._found.keep([number], COMPUTED)
         if computed or not self._routines.given.isdisjoint({key, name}):
-            self._unsure.add(number)
+            self._found.unsure.add(number)
 
 
 def _parts(found: Sequence[Token]) -> list[list[Token]]:

@@ -11,7 +11,7 @@ from truearm.programs.environment import Frame, Transform
 from truearm.programs.frames import KRL_WORLD, Frames, name_at_start, written_out
 from truearm.programs.krl_order import Order
 from truearm.programs.krl_routines import Routines
-from truearm.programs.krl_storage import KrlStorage
+from truearm.programs.krl_storage import WORLD_SET_BY, KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
 
@@ -21,6 +21,7 @@ DIFFERS: Final = "it is not the same on all ways to this motion"
 CALLERS: Final = "it is the one that the callers of this routine have set"
 INTERRUPTED: Final = "a subroutine that an interrupt or a trigger calls may have set another"
 JUMPED: Final = "a GOTO may come here with another"
+GIVEN: Final = "is given to a subroutine, which may change it"
 ROUND_AGAIN: Final = "a loop comes round to it with another tool or base"
 KINDS: Final = {"tool": "TOOL_DATA", "base": "BASE_DATA"}
 PARTS: Final = (*KINDS, "mode")
@@ -114,8 +115,18 @@ class KrlFrames:
     ) -> None:
         self._storage, self._frames, self._sources = storage, frames, sources
         self._routines, self._order = routines, order
-        self._world = frames.held("object", KRL_WORLD) or Frame.of(np.eye(4), KRL_WORLD)
+        self._world = self._find_world()
         self._written = {kind: self._names_of_written(kind) for kind in KINDS}
+
+    def _find_world(self) -> Frame:
+        """The world in the arm's base; not known, nor is any base, where the program may move it.
+
+        What one run moves is moved when the next one begins: it does not matter where in the text that is.
+        """
+        given = (f"{name.upper()} {GIVEN}" for name in WORLD_SET_BY if name in self._routines.given)
+        moved = self._storage.moved or next(given, "")
+        held = self._frames.held("object", KRL_WORLD)
+        return Frame.missing(f"base: {moved}") if moved else held or Frame.of(np.eye(4), KRL_WORLD)
 
     def _names_of_written(self, kind: str) -> dict[bytes, str]:
         """Names of tools or bases that are written out, by their numbers."""
@@ -167,7 +178,7 @@ class KrlFrames:
         if (key in storage.values and stated is None) or f"{array}[?]" in storage.values:
             return "is assigned more than once, or at run time"
         if {key, array, f"{array}[?]"} & self._routines.given:
-            return "is given to a subroutine, which may change it"
+            return GIVEN
         if key in storage.values and not self._holds(key):
             return "is assigned in the program, but not certainly before it is used"
         return ""
@@ -231,4 +242,4 @@ class KrlFrames:
         return self.named(kind, operand.key.upper())
 
     def _placed(self, kind: str, frame: Frame) -> Frame:
-        return frame if kind == "tool" or frame.unknown else self._world.then(frame)
+        return frame if kind == "tool" else self._world.then(frame)

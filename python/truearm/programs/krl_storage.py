@@ -23,6 +23,8 @@ ASSIGNING: Final = re.compile(r"[ \t]*[A-Za-z_$][\w$]*(?:[ \t]*\[[^\]\r\n]*\])?(
 TARGET_KINDS: Final = frozenset({"pos", "e6pos", "axis", "e6axis"})
 PREPARED: Final = frozenset({"fdat_act", "pdat_act", "ldat_act", "$h_pos"})
 """What is assigned as it is, without computing with it."""
+WORLD_SET_BY: Final = ("$robroot", "$ersysroot", "$world")
+"""What tells where the world is in the arm's base."""
 COMPUTED: Final = "it is assigned at run time"
 TWICE: Final = "it is assigned more than once"
 PARAMETER: Final = "a routine is given a value of that name at run time"
@@ -51,6 +53,7 @@ class KrlStorage:
         parameters: Names of what routines are given.
         read: Names that the program computes with.
         grids: Names of arrays of several dimensions.
+        moved: Which of WORLD_SET_BY is set, and where, in words that end a listing; empty where none is.
     """
 
     def __init__(self) -> None:
@@ -60,6 +63,7 @@ class KrlStorage:
         self.parameters: set[str] = set()
         self.read: set[str] = set()
         self.grids: set[str] = set()
+        self.moved = ""
 
     def gather(self, file: int, source: Source) -> None:
         """Take what a file stores.
@@ -125,7 +129,7 @@ class KrlStorage:
             if variable is None:
                 return
             self.kinds.setdefault(variable.name, kind)
-            self._shaped(variable)
+            self._note(variable, reader)
             if reader.accept("="):
                 self.initial.add(variable.key)
                 self._keep(file, variable, reader)
@@ -136,7 +140,7 @@ class KrlStorage:
         variable = named(reader)
         if variable is None:
             return
-        self._shaped(variable)
+        self._note(variable, reader)
         if initial:
             self.initial.add(variable.key)
         if reader.accept("="):
@@ -145,9 +149,12 @@ class KrlStorage:
         self.values.setdefault(variable.key, []).append((file, None))
         self.read |= names_in(reader.rest())
 
-    def _shaped(self, variable: Named) -> None:
+    def _note(self, variable: Named, reader: Reader) -> None:
         if variable.several:
             self.grids.add(variable.name)
+        if variable.name in WORLD_SET_BY and not self.moved:
+            line, _ = reader.source.place(variable.at)
+            self.moved = f"{variable.name.upper()} is set in line {line}, which moves the world"
 
     def _keep(self, file: int, variable: Named, reader: Reader) -> None:
         whole = reader.rest()

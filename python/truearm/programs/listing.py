@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.programs.program import Listed, Program
+from truearm.programs.source import Source
 
 NAMED: Final = 10
+LONGEST_NAME: Final = 120
+"""Characters of a line that tell what is on it: a program may be one line."""
 DIMENSIONS: Final = "arrays of more dimensions than one are not read"
 
 
@@ -13,12 +16,13 @@ def listed_target(program: Program, target: int, reason: str) -> Listed:
     """A target in a listing."""
     targets = program.targets
     file, at = int(targets.source[target]), int(targets.at[target])
-    return _listed(program, file, at, targets.names.get(target, ""), reason)
+    return listed_at(program.sources, (file, at), targets.names.get(target, ""), reason)
 
 
 def listed_move(program: Program, move: int, reason: str) -> Listed:
     """The statement of a move in a listing."""
-    return _listed(program, int(program.moves.source[move]), int(program.moves.at[move]), "", reason)
+    place = int(program.moves.source[move]), int(program.moves.at[move])
+    return listed_at(program.sources, place, "", reason)
 
 
 def describe(program: Program, listed: Sequence[Listed], most: int = NAMED) -> str:
@@ -37,7 +41,9 @@ def shortened(name: str, most: int = 40) -> str:
     return name if len(name) <= most else f"{name[: most - 3]}..."
 
 
-def _listed(program: Program, file: int, at: int, name: str, reason: str) -> Listed:
-    source = program.sources[file]
-    line, column = source.place(at)
-    return Listed(file, line, column, name or source.line_text(line).strip(), reason)
+def listed_at(sources: Sequence[Source], place: tuple[int, int], name: str, reason: str) -> Listed:
+    """What stands at a file and an offset in a listing; what has no name is told by its line."""
+    file, at = place
+    line, column = sources[file].place(at)
+    shown = name or " ".join(sources[file].line_text(line).split())
+    return Listed(file, line, column, shown[:LONGEST_NAME], reason)

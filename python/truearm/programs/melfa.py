@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from truearm.programs.branches import Branches
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
+from truearm.programs.melfa_configuration import StructureFlags
 from truearm.programs.melfa_reader import Reader
 from truearm.programs.melfa_steps import inserted
 from truearm.programs.melfa_text import lines
@@ -43,20 +45,8 @@ class MelfaBasic(BlendsShortened):
     def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
         """As in Language."""
         reader = Reader(sources[0], robot, frames)
-        configuration = reader.configuration()
-        return Program(
-            language=self,
-            sources=tuple(sources),
-            layouts=(Joints.of(robot.joints), FLAGGED),
-            targets=reader.targets.freeze(),
-            moves=reader.moves.freeze(),
-            environments=tuple(reader.environments.all),
-            listed=tuple(sorted(reader.listed)),
-            configuration=configuration,
-            fixed=reader.fixed,
-            unsure=reader.unsure,
-            unplaced=reader.unplaced,
-        )
+        layouts = (Joints.of(robot.joints), FLAGGED)
+        return reader.found.program(self, layouts, lambda: StructureFlags(Branches.of(robot)))
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A remark: a line of its own before the first one; where lines are numbered and there is no number

@@ -7,16 +7,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
-from truearm.programs.branches import Branches
-from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
+from truearm.programs.environment import IDENTITY, Environment, Frame
 from truearm.programs.frames import Frames, name_at_start, written_out
-from truearm.programs.melfa_configuration import StructureFlags
+from truearm.programs.gathered import Gathered
 from truearm.programs.melfa_flow import Ways
 from truearm.programs.melfa_text import (
     JOINTS,
     NAME,
-    POSE,
     SLOTS,
     Move,
     array_of,
@@ -25,9 +22,8 @@ from truearm.programs.melfa_text import (
     statements,
 )
 from truearm.programs.melfa_variables import COMBINED, FLAGS, SETTING, Variable, Variables
-from truearm.programs.program import Listed, Unplaced
 from truearm.programs.source import Source
-from truearm.programs.tables import ABSENT, Motion, MoveTable, TargetTable
+from truearm.programs.tables import ABSENT, Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 
@@ -61,7 +57,6 @@ _CALLING: Final = re.compile(r"\s*(CallP|RelM)\b", re.IGNORECASE)
 _SET_BY: Final[Mapping[Kind, tuple[str, ...]]] = {"tool": ("tool", "m_tool"), "base": ("base",)}
 _NUMBERED: Final = "M_Tool="
 _SKIPPED: Final = re.compile(r"(?<![\w.])Skip\b", re.IGNORECASE)
-LONGEST_NAME: Final = 48
 COMPUTED: Final = "its target is computed when the program runs"
 RELATIVE: Final = "it is a relative move"
 NOT_CONSTANT: Final = "its target is not a constant of this file"
@@ -71,22 +66,11 @@ class Reader:
     """One program.
 
     Attributes:
-        targets: Constants of position and joint variables.
-        moves: Motions to them.
-        environments: Tools, bases and offsets of the motions.
-        listed: What is left as it is.
-        fixed: Why variables cannot be changed whatever uses them, by target.
-        unplaced: Motions to places that are not constants of the program.
-        unsure: Targets of variables that may hold something else when the program runs.
+        found: Constants of position and joint variables, and their uses.
     """
 
     def __init__(self, source: Source, robot: Robot, frames: Frames) -> None:
-        self.targets, self.moves = TargetTable(), MoveTable()
-        self.environments = Environments()
-        self.listed: list[Listed] = []
-        self.fixed: dict[int, str] = {}
-        self.unsure: set[int] = set()
-        self.unplaced: list[Unplaced] = []
+        self.found = Gathered((source,))
         self._source, self._robot, self._frames = source, robot, frames
         self._statements = list(statements(source))
         self._moves = {place: found for place, one in enumerate(self._statements) if (found := moves(one))}
@@ -107,16 +91,6 @@ class Reader:
         for place in range(len(self._statements)):
             self._statement(place)
 
-    def configuration(self) -> StructureFlags | None:
-        """How flags are meant; None for an arm whose flags we cannot compute."""
-        try:
-            return StructureFlags(Branches.of(self._robot))
-        except InputError as unsuited:
-            for name, variable in self._variables.targets():
-                if variable.constants[0][1].layout == POSE:
-                    self.fixed.setdefault(self._targets[name], unsuited.what)
-            return None
-
     def _target(self, name: str, variable: Variable) -> int:
         """The number of the last target added: one for each constant of the variable."""
         number, why_not = -1, self._variables.why_not(name)
@@ -127,11 +101,11 @@ class Reader:
             numbers = held.numbers if not held.problem else (ABSENT,) * width
             text = self._source.text
             shown = text[at : text.index("=", at)].strip()
-            number = self.targets.add(0, at, layout, numbers, shown)
+            number = self.found.targets.add(0, at, layout, numbers, shown)
             if held.problem or why_not:
-                self.fixed[number] = held.problem or why_not
+                self.found.fixed[number] = held.problem or why_not
             if not holds:
-                self.unsure.add(number)
+                self.found.unsure.add(number)
         return number
 
     def _find_settings(self, kind: Kind) -> dict[int, str]:
@@ -230,9 +204,8 @@ class Reader:
         word = move.word.casefold()
         line = self._source.place(move.at)[0]
         if word not in _KINDS:
-            self._list(
-                move.at, f"{move.word} is not followed: the tool stands still, or it is a relative move"
-            )
+            why = f"{move.word} is not followed: the tool stands still, or it is a relative move"
+            self.found.leave((0, move.at), why)
             self._keep(move.pieces, f"it is also used in line {line} by {move.word}, which is not followed")
             self._follows = False
             return
@@ -244,14 +217,14 @@ class Reader:
         places = [self._place(piece) for piece in pieces]
         for piece, found in zip(pieces, places, strict=True):
             if isinstance(found, str):
-                self._list(move.at, found)
+                self.found.leave((0, move.at), found)
                 self._keep([piece], f"a target is computed from it in line {line} when the program runs")
         for number, kind in kinds:
             found = places[number] if number < len(places) else COMPUTED
             if isinstance(found, str):
                 self._follows = False
                 if found != RELATIVE:
-                    self.unplaced.append(Unplaced(0, move.at, kind, self._blended or kind == Motion.VIA))
+                    self.found.unplace((0, move.at), kind, blended=self._blended or kind == Motion.VIA)
                 continue
             target, before, after = found
             environment = self._environment(place, before, after @ offset, problem)
@@ -270,11 +243,11 @@ class Reader:
         )
 
     def _go(self, at: int, target: int, kind: Motion, environment: Environment) -> None:
-        self.moves.add(
+        self.found.moves.add(
             target,
             (0, at),
             kind,
-            environment=self.environments.number(environment),
+            environment=self.found.environments.number(environment),
             blended=self._blended or kind == Motion.VIA,
             follows=self._follows,
         )
@@ -282,10 +255,8 @@ class Reader:
     def _keep(self, pieces: Sequence[str], reason: str) -> None:
         """Variables in pieces of a motion that is not certain cannot be changed."""
         for name in (name for piece in pieces for name in self._variables.named(piece)):
-            elements = self._elements.get(name, ()) if name not in self._targets else ()
-            for target in (self._targets.get(name), *elements):
-                if target is not None:
-                    self.fixed.setdefault(target, reason)
+            own = [self._targets[name]] if name in self._targets else self._elements.get(name, ())
+            self.found.keep(own, reason)
 
     def _place(self, piece: str) -> tuple[int, Transform, Transform] | str:
         """Target and what is before and after it; or why it is not known."""
@@ -311,11 +282,6 @@ class Reader:
         before = np.eye(4)
         before[:3, 3] = other[:3, 3] if operator == "+" else -other[:3, 3]
         return target, before, np.eye(4)
-
-    def _list(self, at: int, reason: str) -> None:
-        line, column = self._source.place(at)
-        shown = " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
-        self.listed.append(Listed(0, line, column, shown, reason))
 
 
 def _close_distance(pieces: Sequence[str]) -> tuple[Transform, str]:

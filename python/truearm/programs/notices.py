@@ -11,7 +11,7 @@ from truearm.fits.stillness import carried_joints, moved_joints, still_words
 from truearm.inputs import PAYLOAD_KG, is_payload
 from truearm.programs.declaring import maker_of
 from truearm.programs.environment import Environment, Frame
-from truearm.programs.frames import Frames, Kind
+from truearm.programs.frames import WORLDS, Frames, Kind
 from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
@@ -189,8 +189,8 @@ def object_notices(done: Rewritten) -> list[Notice]:
     """Work objects of changed Cartesian targets that were not taught through a calibration.
 
     One that was touched with the arm as the controller has it holds the errors that the arm has there, and
-    the uncorrected arm comes back to it with the same ones. The base itself is no work object, and one that
-    is elsewhere than the controller has it was told by whoever wrote the frames file.
+    the uncorrected arm comes back to it with the same ones. Neither the base nor the controller's world is
+    touched, and one that is elsewhere than the controller has it was told by whoever wrote the frames file.
     """
     places = {one.work_object.name: one for one in _environments_of(done, of_joints=False)}
     doubtful = {name: one for name, one in places.items() if name and not _is_told(one.work_object)}
@@ -211,8 +211,9 @@ def object_notices(done: Rewritten) -> list[Notice]:
 
 
 def _is_told(place: Frame) -> bool:
-    """Whether a work object is the base, was taught through a calibration, or is told to be elsewhere."""
-    is_base = np.array_equal(place.controller, np.eye(4))
+    """Whether a work object is base or world, was taught by a calibration, or is told to be elsewhere."""
+    is_world = place.name.casefold() in {name.casefold() for name in WORLDS}
+    is_base = is_world or np.array_equal(place.controller, np.eye(4))
     return place.taught or is_base or not np.array_equal(place.true, place.controller)
 
 

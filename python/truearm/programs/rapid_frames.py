@@ -57,7 +57,7 @@ class RapidFrames:
         if isinstance(value, str):
             return Found(self._missing("work object", name, value))
         if value is None:
-            return Found(self._in_world(self._frames.work_object(name)))
+            return Found(self._world.then(self._frames.work_object(name)))
         poses = [pose_of(part) for part in value.values[3:5]]
         if len(value.values) != 5 or poses[0] is None or poses[1] is None:
             return Found(Frame.missing(f'work object "{name}" is not written out in numbers', name))
@@ -65,7 +65,7 @@ class RapidFrames:
         if truth(value.values[1]) is not True:
             problem = problem or MOVED
         stated = poses[0][1] @ poses[1][1]
-        return Found(self._in_world(self._frames.work_object(name, stated)), problem)
+        return Found(self._world.then(self._frames.work_object(name, stated)), problem)
 
     def payload_kg(self, tool: Sequence[Token], total: Sequence[Token]) -> float | None:
         """The mass at the flange that a motion states: of its total load, or of its tool."""
@@ -100,9 +100,6 @@ class RapidFrames:
 
     def _missing(self, what: str, name: str, why: str) -> Frame:
         return Frame.missing(f'{what} "{name}" {why}', name)
-
-    def _in_world(self, frame: Frame) -> Frame:
-        return frame if frame.unknown else self._world.then(frame)
 
 
 def _mass(value: Value) -> float | None:

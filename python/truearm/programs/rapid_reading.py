@@ -1,7 +1,7 @@
 """Reading RAPID: first what is declared, then the motions in their order."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -9,17 +9,25 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
-from truearm.programs.configuration import configured
-from truearm.programs.environment import Environment, Environments, Transform
+from truearm.programs.environment import Environment, Transform
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
+from truearm.programs.gathered import Gathered
 from truearm.programs.layouts import Joints, QuaternionPose
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.program import Listed, Program, Unplaced
+from truearm.programs.program import Program
 from truearm.programs.rapid_configuration import Confdata
 from truearm.programs.rapid_confs import KINDS, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
+from truearm.programs.rapid_instructions import (
+    COUNTING,
+    HARMLESS,
+    INSTRUCTIONS,
+    MOVING,
+    Instruction,
+    motions_named,
+)
 from truearm.programs.rapid_routines import BEGINNINGS, ENDINGS, given, is_variable
 from truearm.programs.rapid_targets import Meant, RapidTargets
 from truearm.programs.rapid_values import (
@@ -33,7 +41,7 @@ from truearm.programs.rapid_values import (
     statements,
 )
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, MoveTable, TargetTable
+from truearm.programs.tables import Motion
 from truearm.robot import Robot
 
 if TYPE_CHECKING:
@@ -45,65 +53,6 @@ HANDLER: Final = re.compile(
 )
 """What may be executed between any two motions."""
 DISPLACEMENT: Final = re.compile(r"\b(?:pdisp|eoffs)(?:set|on)\b", re.IGNORECASE)
-STRAIGHT: Final = (Motion.LINEAR,)
-ARC: Final = (Motion.VIA, Motion.CIRCULAR)
-
-
-@dataclass(frozen=True)
-class _Instruction:
-    """A motion: how it goes, and where among its arguments zone and tool stand."""
-
-    motions: tuple[Motion, ...]
-    zone: int
-    tool: int
-
-
-def _kinds() -> Mapping[str, _Instruction]:
-    found = {"moveabsj": _Instruction((Motion.JOINT,), 2, 3)}
-    for ending in ("", "do", "ao", "go", "sync"):
-        found[f"movej{ending}"] = _Instruction((Motion.JOINT,), 2, 3)
-        found[f"movel{ending}"] = _Instruction(STRAIGHT, 2, 3)
-        found[f"movec{ending}"] = _Instruction(ARC, 3, 4)
-    found |= {
-        "triggj": _Instruction((Motion.JOINT,), 3, 4),
-        "triggl": _Instruction(STRAIGHT, 3, 4),
-        "triggc": _Instruction(ARC, 4, 5),
-    }
-    for ending in ("", "start", "end"):
-        found[f"arcl{ending}"] = _Instruction(STRAIGHT, 4, 5)
-        found[f"arcc{ending}"] = _Instruction(ARC, 5, 6)
-    return found
-
-
-INSTRUCTIONS: Final = _kinds()
-HARMLESS: Final = frozenset(
-    {
-        "set",
-        "reset",
-        "setdo",
-        "setgo",
-        "setao",
-        "pulsedo",
-        "waittime",
-        "waitdi",
-        "waituntil",
-        "waitrob",
-        "tpwrite",
-        "tperase",
-        "accset",
-        "velset",
-        "singarea",
-        "confj",
-        "confl",
-        "clkstart",
-        "clkstop",
-        "clkreset",
-        "motionsup",
-        "gripload",
-    }
-)
-COUNTING: Final = frozenset({"incr", "decr", "add", "clear"})
-"""Harmless but for what they are given."""
 HANDLERS: Final = frozenset({"error", "undo", "backward"})
 BEGINS: Final = BEGINNINGS | {"module"}
 ENDS: Final = ENDINGS | HANDLERS | {"endmodule", "goto"}
@@ -150,13 +99,9 @@ class RapidReading:
         self._language, self._source, self._robot = language, sources[0], robot
         self._declarations = Declarations()
         self._declarations.gather(self._source)
-        self._table, self._moves, self._environments = TargetTable(), MoveTable(), Environments()
-        self._targets = RapidTargets(self._declarations, self._source, self._table)
+        self._found = Gathered((self._source,))
+        self._targets = RapidTargets(self._declarations, self._source, self._found.targets)
         self._frames = RapidFrames(self._declarations, frames)
-        self._listed: list[Listed] = []
-        self._fixed: dict[int, str] = {}
-        self._unsure: set[int] = set()
-        self._unplaced: list[Unplaced] = []
         self._read: dict[str, str] = {}
         self._displaces = DISPLACEMENT.search(self._source.text) is not None
         self._displaced_anytime = any(
@@ -165,7 +110,6 @@ class RapidReading:
         start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
         self._confs = Confs()
-        self._nearest: dict[int, bool] = {}
         self._used: list[int] = []
         self._uses: list[_Use] = []
         self._gifts: set[tuple[str, str]] = set()
@@ -180,30 +124,8 @@ class RapidReading:
         self._declarations.give(self._gifts)
         self._move()
         self._settle()
-        layouts, targets = (
-            (Joints.of(self._robot.joints), QuaternionPose(configuration=4)),
-            self._table.freeze(),
-        )
-        try:
-            configuration = Confdata(Branches.of(self._robot))
-        except InputError as unsuited:
-            configuration = None
-            for target in configured(targets, layouts):
-                self._fixed.setdefault(target, unsuited.what)
-        return Program(
-            self._language,
-            (self._source,),
-            layouts,
-            targets,
-            self._moves.freeze(),
-            tuple(self._environments.all),
-            tuple(sorted(self._listed)),
-            configuration,
-            fixed=self._fixed,
-            unsure=self._unsure,
-            nearest=self._nearest,
-            unplaced=self._unplaced,
-        )
+        layouts = (Joints.of(self._robot.joints), QuaternionPose(configuration=4))
+        return self._found.program(self._language, layouts, lambda: Confdata(Branches.of(self._robot)))
 
     # Blocks.
 
@@ -329,8 +251,8 @@ class RapidReading:
             if word in LEAVING:
                 self._confs.note("leave")
         elif word not in HARMLESS | COUNTING:
-            if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
-                self._list(at, "an instruction that is not known here")
+            if word.startswith(MOVING):
+                self._leave(at, "an instruction that is not known here", motions_named(word))
             else:
                 self._confs.note("call", word)
             self._flow.jump()
@@ -361,19 +283,17 @@ class RapidReading:
             self._flow.state = replace(state, problem=DISPLACED)
         self._mention(found[1:], READ)
 
-    def _motion(self, at: int, instruction: _Instruction, stated: list[Argument]) -> None:
+    def _motion(self, at: int, instruction: Instruction, stated: list[Argument]) -> None:
         """A motion: its targets, with the tool and the work object of the statement."""
         plain = [argument for argument in stated if argument.tokens]
         count = len(instruction.motions)
         if len(plain) <= instruction.tool:
-            self._list(at, "it has fewer arguments than this instruction needs")
-            self._flow.jump()
+            self._leave(at, "it has fewer arguments than this instruction needs", instruction.motions)
             return
         if any("corr" in argument.options for argument in stated):
-            self._list(at, "its path is corrected by sensors (\\Corr)")
+            self._leave(at, "its path is corrected by sensors (\\Corr)", instruction.motions)
             for argument in plain[:count]:
                 self._mention(argument.tokens, READ)
-            self._flow.jump()
             return
         zone = plain[instruction.zone].tokens
         blended = not (len(zone) == 1 and zone[0].text.lower() == "fine")
@@ -389,9 +309,7 @@ class RapidReading:
 
     def _go(self, at: int, motion: Motion, meant: Meant | str, tool: Argument, *, passed: bool) -> None:
         if isinstance(meant, str):
-            self._list(at, meant)
-            self._unplaced.append(Unplaced(0, at, motion, passed))
-            self._flow.jump()
+            self._leave(at, meant, (motion,), passed=passed)
             return
         flow = self._flow
         follows = flow.certain and len(meant.targets) == 1
@@ -403,9 +321,12 @@ class RapidReading:
         if len(meant.targets) > 1:
             flow.jump()
 
-    def _list(self, at: int, reason: str) -> None:
-        line, column = self._source.place(at)
-        self._listed.append(Listed(0, line, column, self._source.line_text(line).strip(), reason))
+    def _leave(self, at: int, reason: str, motions: Sequence[Motion], *, passed: bool = True) -> None:
+        """A statement is listed, its motions lead to no targets that are read, and stop unless `passed`."""
+        self._found.leave((0, at), reason)
+        for motion in motions:
+            self._found.unplace((0, at), motion, blended=passed)
+        self._flow.jump()
 
     # At the end.
 
@@ -414,11 +335,11 @@ class RapidReading:
         nearest = self._confs.nearest()
         for number, use in enumerate(self._uses):
             problem = self._targets.doubt(use.meant.targets, heeded=nearest.get(number) is not True)
-            environment = self._environments.number(self._environment(use, problem))
+            environment = self._found.environments.number(self._environment(use, problem))
             for target in use.meant.targets:
                 if number in nearest:
-                    self._nearest[len(self._moves)] = nearest[number]
-                self._moves.add(
+                    self._found.nearest[len(self._found.moves)] = nearest[number]
+                self._found.moves.add(
                     target,
                     (0, use.at),
                     use.motion,
@@ -448,7 +369,7 @@ class RapidReading:
             if datum.kind in TARGETS:
                 self._settle_one(key.partition("{")[0], key)
         for use in self._flow.overruled:
-            self._fixed.setdefault(self._used[use], DISPLACED)
+            self._found.keep([self._used[use]], DISPLACED)
 
     def _settle_one(self, name: str, key: str) -> None:
         found = self._targets.stored(key)
@@ -457,16 +378,15 @@ class RapidReading:
             written = isinstance(value, Aggregate) or key != name
             at = place_of(value) if value is not None and written else None
             if at is not None:
-                line, column = self._source.place(at)
-                self._listed.append(Listed(0, line, column, key, found))
+                self._found.leave((0, at), found, key)
         elif name in self._declarations.assigned:
-            self._fixed.setdefault(found, "it is assigned at run time")
+            self._found.keep([found], "it is assigned at run time")
         elif name in self._declarations.twice:
-            self._fixed.setdefault(found, f"it {TWICE}")
+            self._found.keep([found], f"it {TWICE}")
         elif name in self._read:
-            self._fixed.setdefault(found, self._read[name])
+            self._found.keep([found], self._read[name])
         if not isinstance(found, str) and self._declarations.doubt(name):
-            self._unsure.add(found)
+            self._found.unsure.add(found)
 
 
 def _skip(reader: Reader, opening: str, closing: str) -> None:

@@ -8,12 +8,12 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.compensation import Compensator, Refusal
 from truearm.controller import Controller
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import make_directory
 from truearm.inverse import Inverse
 from truearm.kinds import check_number, check_positive, check_values, required
-from truearm.programs.corrections import Compensator, Refusal
 from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
@@ -338,9 +338,7 @@ class _State:
         self.residual_mm = _with_largest(self.residual_mm, rows, found.residual_mm)
         self.residual_mrad = _with_largest(self.residual_mrad, rows, found.residual_mrad)
         self._take_refusals(which, found.refusals)
-        refused = np.array(found.refused, dtype=bool)
-        if found.std_mm is not None:
-            refused |= self._judge_std(which, found.std_mm, refused, tool)
+        refused = found.refused | self._judge_std(which, found.std_mm, found.refused, tool)
         self.corrected[which[refused]] = self.nominal[which[refused]]
 
     def _take_refusals(self, which: Integers, refusals: Sequence[Refusal]) -> None:
@@ -446,24 +444,24 @@ class _State:
             [*self.program.listed, *(self._listed(target, why) for target, why in self.reasons.items())]
         )
         return Rewritten(
-            self.program,
-            tuple(contents),
-            self.nominal,
-            self.corrected,
-            changed,
-            self.correction_mm,
-            self.correction_mrad,
-            self.std_mm,
-            self.residual_mm,
-            self.residual_mrad,
-            written.moved_mm,
-            self.offset_mm,
-            self.offset_mrad,
-            kept,
-            tuple(listed),
-            steps.texts.waypoints,
-            steps.deviating,
-            (
+            program=self.program,
+            contents=tuple(contents),
+            nominal=self.nominal,
+            corrected=self.corrected,
+            changed=changed,
+            correction_mm=self.correction_mm,
+            correction_mrad=self.correction_mrad,
+            std_mm=self.std_mm,
+            residual_mm=self.residual_mm,
+            residual_mrad=self.residual_mrad,
+            moved_mm=written.moved_mm,
+            offset_mm=self.offset_mm,
+            offset_mrad=self.offset_mrad,
+            kept=kept,
+            listed=tuple(listed),
+            inserted=steps.texts.waypoints,
+            deviating=steps.deviating,
+            notices=(
                 *step_notices(*self.given, changed[: len(self.given.program.targets)]),
                 *offset_notices(self.program, self.offset_mm, self.offset_mrad),
                 *deviation_notices(self.program, steps.deviating, choices.spacing),

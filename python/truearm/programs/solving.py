@@ -29,6 +29,10 @@ Bools = NDArray[np.bool_]
 OUT_OF_REACH: Final = "the nominal arm does not reach it"
 NO_BRANCH: Final = "the nominal arm does not reach it in the configuration that it states"
 AMBIGUOUS: Final = "several configurations of the arm reach it, and the program does not tell which is meant"
+UNKNOWN_BEFORE: Final = (
+    "several configurations of the arm reach it, of which the one nearest to the target before is meant, and "
+    "that is not known: none comes before, or another may (a loop, a branch, a call), or it is listed"
+)
 CONTRADICTS: Final = "its configuration data is another than a line from the target before arrives in"
 UNHEEDED: Final = (
     "the controller does not heed its configuration data there (ConfJ or ConfL is off), and the target "
@@ -313,7 +317,7 @@ class _Solver:
             return self._stated(possible, possible.named, came)
         found = self._unnamed(possible, came.before)
         if isinstance(found, str):
-            if found == AMBIGUOUS:
+            if found in {AMBIGUOUS, UNKNOWN_BEFORE}:
                 return UNHEEDED if came.nearest else PERHAPS_HEEDED
             return found
         stated = found if came.nearest else self._stated(possible, possible.named, came)
@@ -338,7 +342,7 @@ class _Solver:
     def _from_seed(self, flange: Floats, before: Floats | None) -> Floats | str:
         """The readings that a search from those before arrives at, where it arrives near by."""
         if before is None:
-            return AMBIGUOUS
+            return UNKNOWN_BEFORE
         (found,) = self.inverse.near_or_nan(flange[None], before[None])
         if np.isnan(found).any():
             return OUT_OF_REACH
@@ -349,7 +353,7 @@ class _Solver:
     def _unnamed(self, possible: _Possible, before: Floats | None) -> Floats | str:
         """The readings nearest to those before, where the text does not tell."""
         if before is None:
-            return AMBIGUOUS
+            return UNKNOWN_BEFORE
         which, candidates = self._nearest_turns(possible.branches, before)
         place = the_nearest(candidates, before) if len(candidates) else None
         if place is None:

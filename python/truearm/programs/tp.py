@@ -15,7 +15,7 @@ from truearm.programs.layouts import Joints
 from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.tp_configuration import ConfiguredPose
-from truearm.programs.tp_positions import line_count, section
+from truearm.programs.tp_positions import section
 from truearm.programs.tp_reader import Reader
 from truearm.programs.tp_steps import inserted
 from truearm.robot import Robot
@@ -40,20 +40,8 @@ class FanucTp(BlendsShortened):
     def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
         """As in Language."""
         reader = Reader(sources[0], robot, frames)
-        return Program(
-            language=self,
-            sources=tuple(sources),
-            layouts=(Joints.of(robot.joints), ConfiguredPose()),
-            targets=reader.targets.freeze(),
-            moves=reader.moves.freeze(),
-            environments=tuple(reader.environments.all),
-            listed=tuple(sorted(reader.listed)),
-            configuration=reader.configuration(),
-            fixed=reader.fixed,
-            unsure=reader.unsure,
-            unplaced=reader.unplaced,
-            line_count=line_count(sources[0]),
-        )
+        layouts = (Joints.of(robot.joints), ConfiguredPose())
+        return reader.found.program(self, layouts, reader.configuration)
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """Remarks before the first line of /MN, none longer than a remark may be."""

@@ -41,6 +41,7 @@ class Position:
         frame: Number of its user frame; F for the current one.
         tool: Number of its tool frame; F for the current one.
         problem: Why it cannot be changed with certainty; empty if it can.
+        sure: Whether it certainly is the one of its number.
     """
 
     number: int
@@ -50,6 +51,7 @@ class Position:
     frame: str
     tool: str
     problem: str = ""
+    sure: bool = True
 
 
 def line_count(source: Source) -> LineCount | None:

@@ -2,20 +2,20 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
 from truearm.programs.branches import Branches
-from truearm.programs.environment import Environment, Environments, Frame
+from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames
-from truearm.programs.program import Listed, Unplaced
+from truearm.programs.gathered import Gathered
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
+from truearm.programs.tables import Motion, Number
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
-from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions, section
+from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, line_count, positions, section
 from truearm.programs.tp_registers import StatedFrames
 from truearm.programs.tp_state import JUMPS, OFFSET, SENSED, Current, moved_at
 from truearm.robot import Robot
@@ -40,7 +40,7 @@ _OPTIONS: Final = (
 # fmt: on
 _MOTIONS: Final = {"J": Motion.JOINT, "L": Motion.LINEAR, "C": Motion.CIRCULAR, "A": Motion.CIRCULAR}
 _POSE: Final = ConfiguredPose()
-LONGEST_NAME: Final = 48
+SHARED: Final = "/POS has its number more than once,"
 ORDER_UNKNOWN: Final = (
     "its turn numbers mean different joints to different controllers, and no joint position of the "
     "same place tells which"
@@ -51,52 +51,54 @@ class Reader:
     """One listing.
 
     Attributes:
-        targets: Positions.
-        moves: Their uses.
-        environments: Frames, tools and problems of the uses.
-        listed: What is left as it is.
-        fixed: Why positions cannot be changed whatever uses them, by target.
-        unplaced: Motions to no position of the listing.
-        unsure: Positions that may be others when the program runs, by target.
-        orders: Joints that turn numbers may be of.
+        found: Positions and their uses.
     """
 
     def __init__(self, source: Source, robot: Robot, frames: Frames) -> None:
-        self.targets, self.moves = TargetTable(), MoveTable()
-        self.environments = Environments()
-        self.listed: list[Listed] = []
-        self.fixed: dict[int, str] = {}
-        self.unsure: set[int] = set()
-        self.unplaced: list[Unplaced] = []
+        self.found = Gathered((source,), line_count=line_count(source))
         self._source, self._robot, self._frames = source, robot, frames
         self._main = section(source, "MN")
         start, end = section(source, "POS")
-        self._positions = {p.number: p for p in positions(source, start, end, robot.joint_count)}
-        self._targets = {number: self._target(p) for number, p in self._positions.items()}
+        stated = self._told_apart(positions(source, start, end, robot.joint_count))
+        self._positions = {p.number: p for p in stated}
+        self._targets = {p.number: self._target(p) for p in stated}
         self._current = Current()
         self._settings()
         self._moved = moved_at(source.part(0, self._main[0]), self._statements())
         self._stated = StatedFrames()
         self._used, self._chosen = dict[int, set[int]](), 0
         self._motions()
-        self.orders = self._orders()
+        self._turn_orders = self._orders()
 
-    def configuration(self) -> FanucConfiguration | None:
-        """How CONFIG is meant; None where there is none to read."""
-        if all(position.layout == JOINTS for position in self._positions.values()):
-            return None
-        try:
-            return FanucConfiguration(Branches.of(self._robot), self.orders)
-        except InputError as unsuited:
-            for number, position in self._positions.items():
-                if position.layout == POSE:
-                    self.fixed.setdefault(self._targets[number], unsuited.what)
-            return None
+    def configuration(self) -> FanucConfiguration:
+        """How CONFIG is meant.
+
+        Raises:
+            InputError: If the arm's branches cannot be told by it.
+        """
+        return FanucConfiguration(Branches.of(self._robot), self._turn_orders)
+
+    def _told_apart(self, stated: Iterable[Position]) -> list[Position]:
+        """Positions; which of those that share a number a controller takes is not known."""
+        found = list(stated)
+        lines: dict[int, list[str]] = {}
+        for position in found:
+            lines.setdefault(position.number, []).append(str(self._source.place(position.at)[0]))
+        shared = {number: " and ".join(every) for number, every in lines.items() if len(every) > 1}
+        return [
+            replace(p, problem=f"{SHARED} in lines {shared[p.number]}", sure=False)
+            if p.number in shared
+            else p
+            for p in found
+        ]
 
     def _target(self, position: Position) -> int:
-        number = self.targets.add(0, position.at, position.layout, position.numbers, f"P[{position.number}]")
+        name = f"P[{position.number}]"
+        number = self.found.targets.add(0, position.at, position.layout, position.numbers, name)
         if position.problem:
-            self.fixed[number] = position.problem
+            self.found.fixed[number] = position.problem
+        if not position.sure:
+            self.found.unsure.add(number)
         return number
 
     def _statements(self) -> Iterator[tuple[int, str]]:
@@ -143,7 +145,7 @@ class Reader:
         """Positions that only a motion to a computed number may go to."""
         if self._chosen:
             unused = set(self._targets.values()) - self._used.keys()
-            self._keep(unused, f"only line {self._chosen} may go there, by a computed number")
+            self.found.keep(unused, f"only line {self._chosen} may go there, by a computed number")
 
     def _other_use(self, at: int, text: str) -> None:
         """A position that is read or compared: what it is changed to would be computed with."""
@@ -154,17 +156,12 @@ class Reader:
             number, reason = found.group(2), f"used in line {line} for something else than a motion"
             if number.isdigit():
                 touched = {self._targets[n] for n in {int(number)} & self._targets.keys()}
-                self._keep(touched, f"it is also {reason}")
+                self.found.keep(touched, f"it is also {reason}")
             else:
                 touched = set(self._targets.values())
-                self._keep(touched, f"it may also be {reason}")
+                self.found.keep(touched, f"it may also be {reason}")
             if _ASSIGNED.match(text, found.end()):
-                self.unsure |= touched
-
-    def _keep(self, which: Iterable[int], reason: str) -> None:
-        """Positions cannot be changed with certainty, by target."""
-        for number in which:
-            self.fixed.setdefault(number, reason)
+                self.found.unsure |= touched
 
     def _motion(self, at: int, text: str, kind: str, *, follows: bool) -> bool:
         """One motion; whether the arm is where it leads, afterwards."""
@@ -182,15 +179,15 @@ class Reader:
             if number is None and target.group(1) == "P":
                 self._choose(at, target.group(), problem)
             elif number is None or reason:
-                self._list(at, target.group(), reason)
-                self.unplaced.append(Unplaced(0, at, motion, blended or via))
+                self.found.leave((0, at), reason, target.group())
+                self.found.unplace((0, at), motion, blended=blended or via)
             if number is None or reason:
                 follows = known = False
                 continue
             position = self._positions[number]
-            environment = self.environments.number(self._environment(position, problem))
+            environment = self.found.environments.number(self._environment(position, problem))
             self._used.setdefault(self._targets[number], set()).add(environment)
-            self.moves.add(
+            self.found.moves.add(
                 self._targets[number],
                 (0, at),
                 motion,
@@ -203,20 +200,16 @@ class Reader:
 
     def _choose(self, at: int, name: str, problem: str) -> None:
         """A motion to any position."""
-        self._list(at, name, "which position it is, is computed at run time")
+        self.found.leave((0, at), "which position it is, is computed at run time", name)
         self._chosen = self._chosen or self._source.place(at)[0]
         if problem:
             line = self._source.place(at)[0]
-            self._keep(self._targets.values(), f"line {line} may go there too: {problem}")
+            self.found.keep(self._targets.values(), f"line {line} may go there too: {problem}")
 
     def _why_unknown(self, kind: str, number: int | None) -> str:
         if kind == "PR":
             return "a position register is set at run time"
         return "" if number in self._positions else "there is no such position in /POS"
-
-    def _list(self, at: int, name: str, reason: str) -> None:
-        line, column = self._source.place(at)
-        self.listed.append(Listed(0, line, column, name[:LONGEST_NAME], reason))
 
     def _environment(self, position: Position, problem: str) -> Environment:
         tool = self._frame("UTOOL", position.tool)
@@ -255,13 +248,13 @@ class Reader:
         orders = turn_orders(stated, flange, readings, self._robot)
         for position in turned if len(orders) > 1 else ():
             if any(number.value for number in _turns(position)[:2]):
-                self.fixed.setdefault(self._targets[position.number], ORDER_UNKNOWN)
+                self.found.keep([self._targets[position.number]], ORDER_UNKNOWN)
         return orders
 
     def _flange(self, position: Position) -> Floats:
         """base_from_flange (4, 4) as the controller has it; NaN where frame or tool are not known."""
         used = self._used.get(self._targets[position.number], set())
-        environment = self.environments.all[next(iter(used))] if len(used) == 1 else None
+        environment = self.found.environments.all[next(iter(used))] if len(used) == 1 else None
         if environment is None or environment.tool.unknown or environment.work_object.unknown:
             return np.full((4, 4), np.nan)
         values = np.array([[number.value for number in position.numbers[: len("XYZWPR")]]])

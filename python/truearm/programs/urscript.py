@@ -6,6 +6,7 @@ where the arm stands, or to `qnear`.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from truearm.errors import InputError
@@ -42,17 +43,9 @@ class UrScript:
                 rule="A URScript program is of an arm with six revolute ones",
             )
         reader = Reader(source, frames)
+        layouts = (Joints.of(robot.joints, degrees=False), RotationVectorPose())
         targets, moves = reader.tables()
-        return Program(
-            language=self,
-            sources=tuple(sources),
-            layouts=(Joints.of(robot.joints, degrees=False), RotationVectorPose()),
-            targets=targets,
-            moves=moves,
-            environments=tuple(reader.environments.all),
-            listed=tuple(sorted(reader.listed)),
-            unplaced=reader.unplaced,
-        )
+        return replace(reader.found.program(self, layouts), targets=targets, moves=moves)
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A comment before the first line."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from truearm.programs.environment import Frame
 from truearm.programs.frames import Frames, written_out
-from truearm.programs.program import Listed
+from truearm.programs.gathered import Gathered
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import Constants, RunTime
@@ -42,6 +42,9 @@ UNTRACKED: Final = {
     "mc_run_motion": NOT_FOLLOWED,
     "interpreter_mode": "what is sent to the interpreter moves the arm",
 }
+AIMED: Final = {**MOTIONS, "optimovej": Motion.JOINT, "optimovel": Motion.LINEAR}
+"""How what has a target goes there, whether it is followed or not."""
+WITHIN: Final = "it stands within another statement, or the statement cannot be read"
 SHIFTING: Final = frozenset(
     {"path_offset_enable", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular"}
 )
@@ -57,7 +60,6 @@ HARMLESS: Final = COUNTING | {
 }
 DEFINED: Final = re.compile(rb"\b(?:def|thread|sec)[ \t]+(\w+)")
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
-LONGEST_NAME: Final = 48
 _OPERATORS: Final = ("+", "-", "*", "/", "%", "^")
 TCP: Final = "tcp"
 INSTALLATION: Final = "installation"
@@ -80,7 +82,7 @@ class Collected:
         motions: The other motions.
         constants: Variables.
         elsewhere: Variables used for something else than a motion, and where.
-        listed: Motions without a target.
+        found: Motions without a target.
         shifted: Why no target is where it is written; empty if they are.
         breaks: Offsets behind which the arm may come from several places.
     """
@@ -90,7 +92,7 @@ class Collected:
         self.motions: list[MotionCall] = []
         self.constants = Constants()
         self.elsewhere: dict[str, int] = {}
-        self.listed: list[Listed] = []
+        self.found = Gathered((source,))
         self.shifted = ""
         self.breaks = array("q")
         self._source = source
@@ -111,12 +113,22 @@ class Collected:
         """Names of the program's own functions."""
         return frozenset(name.decode("ascii") for name in DEFINED.findall(self._source.content))
 
-    def leave(self, at: int, name: str, reason: str) -> None:
-        """Something is left as it is, and where the arm comes from behind it is not known."""
-        line, column = self._source.place(at)
-        shown = name or " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
-        self.listed.append(Listed(0, line, column, shown, reason))
+    def leave(
+        self, at: int, name: str, reason: str, motion: Motion | None = None, *, blended: bool = False
+    ) -> None:
+        """Something is left as it is, and where the arm comes from behind it is not known.
+
+        Args:
+            at: Offset of the statement.
+            name: Of its target; empty for one without.
+            reason: Why, in words that end a listing.
+            motion: How the arm goes to a place that is not read; None where it goes to none.
+            blended: Whether it does not stop there.
+        """
+        self.found.leave((0, at), reason, name)
         self.breaks.extend((at, at + 1))
+        if motion is not None:
+            self.found.unplace((0, at), motion, blended=blended)
 
     def compute(self, node: Node, at: int) -> None:
         """The program computes a motion's target, or its numbers, from the variables in `node`."""
@@ -299,10 +311,9 @@ class Collected:
         """Something is called at `at`, which is a step of the program at `step_at`."""
         if name == "interpreter_mode":
             self._scopes.doubt()
-        if name in MOTIONS:
-            self.leave(at, "", "it stands within another statement, or the statement cannot be read")
-        elif name in UNTRACKED:
-            self.leave(at, "", UNTRACKED[name])
+        left = WITHIN if name in MOTIONS else UNTRACKED.get(name, "")
+        if left:
+            self.leave(at, "", left, AIMED.get(name), blended=name in STREAMED)
         elif name in SHIFTING:
             line = self._source.place(at)[0]
             self.shifted = f"{name} in line {line} shifts it when the program runs"

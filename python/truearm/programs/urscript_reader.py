@@ -8,9 +8,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.programs.environment import Environment, Environments
+from truearm.programs.environment import Environment
 from truearm.programs.frames import Frames
-from truearm.programs.program import Listed, Unplaced
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Moves, Number, Targets
 from truearm.programs.urscript_collect import Collected, MotionCall
@@ -69,33 +68,25 @@ class Reader:
     """One program.
 
     Attributes:
-        environments: TCPs, payloads and offsets that motions have.
-        listed: What is left as it is.
-        unplaced: Motions whose targets are computed when the program runs.
+        found: TCPs, payloads and offsets that motions have, and what is left as it is.
     """
 
     def __init__(self, source: Source, frames: Frames) -> None:
-        self.environments = Environments()
-        self._found = Collected(source)
+        self._collected = Collected(source)
+        self.found = self._collected.found
         self._source = source
-        steps = list(self._found.steps(frames))
+        steps = list(self._collected.steps(frames))
         unknown = {step.at: State(UNSURE) for step in steps}
-        flow = unknown | states(steps, State(self._found.installed(frames)))
+        flow = unknown | states(steps, State(self._collected.installed(frames)))
         self._offsets = np.array(sorted(flow), dtype=np.int64)
         self._states = [flow[int(at)] for at in self._offsets]
         self._leaves = _Leaves()
         self._rows = _Rows()
-        self.unplaced: list[Unplaced] = []
         self._slow()
-
-    @property
-    def listed(self) -> list[Listed]:
-        """What is left as it is."""
-        return self._found.listed
 
     def tables(self) -> tuple[Targets, Moves]:
         """All targets and moves, in the order of the text."""
-        lines = list(self._found.lines.columns())
+        lines = list(self._collected.lines.columns())
         count = sum(len(columns.at) for columns in lines)
         leaves, rows = self._leaves, self._rows.columns
         leaf = _joined([c.leaf for c in lines], leaves.at)
@@ -133,7 +124,7 @@ class Reader:
         order = _order(at)
         follows = ~alone[order]
         follows[1:] &= ~alone[order][:-1]
-        behind = np.searchsorted(at[order], np.array(self._found.breaks, dtype=np.int64))
+        behind = np.searchsorted(at[order], np.array(self._collected.breaks, dtype=np.int64))
         follows[behind[behind < len(at)]] = False
         follows[:1] = False
         return Moves(
@@ -155,7 +146,7 @@ class Reader:
         state = self._state(at)
         numbers = np.zeros(len(self._states), dtype=np.int64)
         for one in np.flatnonzero(np.bincount(state, minlength=len(numbers))):
-            numbers[one] = self.environments.number(self._environment(self._states[one]))
+            numbers[one] = self.found.environments.number(self._environment(self._states[one]))
         found: Integers = numbers[state]
         return found
 
@@ -167,16 +158,16 @@ class Reader:
             tool=state.tool,
             before=identity if before is None else before,
             after=identity if after is None else after,
-            problem=self._found.shifted or problem,
+            problem=self._collected.shifted or problem,
             payload_kg=state.payload_kg,
         )
 
     def _slow(self) -> None:
         """Targets and uses of the motions that are no lines of their own."""
-        places = Places(self._found.constants)
-        for motion in self._found.motions:
+        places = Places(self._collected.constants)
+        for motion in self._collected.motions:
             places.note_direct(motion.target)
-        resolved = [(motion, self._places(places, motion)) for motion in self._found.motions]
+        resolved = [(motion, self._places(places, motion)) for motion in self._collected.motions]
         frames = {other for _, found in resolved for place in found for other in place.others}
         for motion, found in resolved:
             for place in found:
@@ -187,15 +178,14 @@ class Reader:
             found = list(places.every(motion.target))
         except RunTime as unknown:
             self._leave(motion, "", unknown)
-            self._found.compute(motion.target, motion.at)
+            self._collected.compute(motion.target, motion.at)
             return []
         for place in found:
-            self._found.compute(place.leaf, motion.at)
+            self._collected.compute(place.leaf, motion.at)
         return found
 
     def _leave(self, motion: MotionCall, name: str, unknown: RunTime) -> None:
-        self._found.leave(motion.at, name, unknown.reason)
-        self.unplaced.append(Unplaced(0, motion.at, motion.motion, motion.blended))
+        self._collected.leave(motion.at, name, unknown.reason, motion.motion, blended=motion.blended)
 
     def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]
@@ -207,17 +197,17 @@ class Reader:
             return
         if seed is not None and place.seed is not None:
             environment = self._environment(state, None, self._problem(place.seed, frames))
-            number = self.environments.number(environment)
+            number = self.found.environments.number(environment)
             self._rows.add(seed, motion.at, int(Motion.SEED), 0, number, int(alone))
-        number = self.environments.number(self._environment(state, place, self._problem(place, frames)))
+        number = self.found.environments.number(self._environment(state, place, self._problem(place, frames)))
         row = (target, motion.at, int(motion.motion), int(motion.blended), number)
         self._rows.add(*row, int(alone and seed is None))
 
     def _problem(self, place: Place, frames: Iterable[int]) -> str:
         if place.leaf.start in frames:
             return ALSO_A_FRAME
-        if place.name in self._found.elsewhere:
-            line = self._source.place(self._found.elsewhere[place.name])[0]
+        if place.name in self._collected.elsewhere:
+            line = self._source.place(self._collected.elsewhere[place.name])[0]
             return f'"{place.name}" is also used in line {line} for something else than a motion'
         return ""
 
