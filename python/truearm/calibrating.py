@@ -21,7 +21,6 @@ from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
     NO_HELP,
     SINGLE_ROWS,
-    Outliers,
     constant_is_better,
     doubts,
     mounting,
@@ -31,6 +30,7 @@ from truearm.doubts.of_results import (
     stated_too_large,
     stood_still,
 )
+from truearm.doubts.outliers import NO_OUTLIERS, Outliers
 from truearm.doubts.plausibility import check_against
 from truearm.doubts.points_together import points_together
 from truearm.doubts.rounded_readings import rounded_notices
@@ -189,7 +189,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
         with stages("looking for lost rows"):
             shifted = fits_shifted(task, data)
     if shifted:
-        doubted = _of_errors(task, found, data, None)
+        doubted = _of_errors(task, found, data, NO_OUTLIERS)
         return [*doubted[:1], *shifted, *doubted[1:]]
     framed = _framed(task, found)
     exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
@@ -219,7 +219,7 @@ def _of_errors(
     task: Task,
     found: Calibration,
     data: Measurements,
-    outliers: Outliers | None,
+    outliers: Outliers,
     unbent: ArmModel | None = None,
 ) -> list[Notice]:
     """What the errors of a calibration say against it, and which outliers may be to blame.
@@ -232,7 +232,7 @@ def _of_errors(
     return [
         *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
         *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data, judged, best, points),
+        *stated_too_large(data, judged, best, points, outliers),
         *constant_is_better(judged, best, points, outliers),
         *_rounded(found, data),
     ]

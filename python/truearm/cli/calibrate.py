@@ -332,7 +332,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
-    from truearm.doubts.of_results import Outliers
+    from truearm.doubts.outliers import Outliers
     from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT, fate_of_outliers
 
     if not outliers or calibration.rows is None:

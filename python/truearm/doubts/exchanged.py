@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.doubts.of_results import ROWS_EXCHANGED, TARGETS_EXCHANGED
+from truearm.doubts.outliers import ROWS_EXCHANGED, TARGETS_EXCHANGED
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.fitting import Task, fit_rows, no_stages

@@ -93,12 +93,17 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 
 
 def _no_gain(arm: Row) -> Iterator[Reason]:
-    before, after = arm["nominal_mean_mm"], arm["mean_mm"]
+    before, after = _mean_mm(arm, "nominal_"), _mean_mm(arm)
     if not helps(before, after):
         none = nothing_to_gain(before, after, arm["floor_mm"])
         said = "There is nothing to gain" if none else "The calibration does not help"
         words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)
+
+
+def _mean_mm(arm: Row, model: str = "") -> float:
+    """Mean error on held-out rows, outliers left out where these are known."""
+    return float(arm.get(f"{model}without_outliers_mm", arm[f"{model}mean_mm"]))
 
 
 def _doubted(arm: Row) -> Iterator[Reason]:
@@ -141,9 +146,9 @@ def _beyond(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
 def _worse(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
     """Against the last calibration; where a limit of the mean is stated, that says what matters."""
     was = (arm["drift"] or {}).get("previous_mean_mm")
-    if was is not None and limits.mean_mm is None and arm["mean_mm"] > WORSE * was:
-        words = f"Mean error {arm['mean_mm']:.3f} mm on held-out rows: it was {was:.3f} mm."
-        yield Reason("worse", words, arm["mean_mm"] / was)
+    if was is not None and limits.mean_mm is None and (mean := _mean_mm(arm)) > WORSE * was:
+        words = f"Mean error {mean:.3f} mm on held-out rows: it was {was:.3f} mm."
+        yield Reason("worse", words, mean / was)
 
 
 def _above(value: float, limit: float) -> str:
@@ -155,13 +160,13 @@ def _above(value: float, limit: float) -> str:
 def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:
     """Against the arms of its kind that were calibrated in the same way."""
     alike = [
-        other["mean_mm"]
+        _mean_mm(other)
         for other in fleet
         if other["status"] != FAILED and (other["robot"], other["model"]) == (arm["robot"], arm["model"])
     ]
     if len(alike) < PEERS:
         return
-    ratio = arm["mean_mm"] / float(np.median(alike))
+    ratio = _mean_mm(arm) / float(np.median(alike))
     if ratio > STANDS_OUT:
         words = f"Mean error {ratio:.1f} times the median of the fleet's {len(alike)} {arm['robot']} arms."
         yield Reason("stands_out", words, ratio)

@@ -88,6 +88,8 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         **{key: errors[key] for key in ("mean_mm", "p95_mm", "max_mm")},
         "nominal_mean_mm": before["mean_mm"],
         "nominal_max_mm": before["max_mm"],
+        "without_outliers_mm": made.means_mm[made.model],
+        "nominal_without_outliers_mm": made.means_mm[NOMINAL],
         "noise_mm": summary["noise_mm"],
         "floor_mm": made.floor_mm,
         "coverage_95": summary["coverage_95"],
