@@ -47,7 +47,8 @@ class ArmMade:
         calibration: Bytes of the calibration file.
         summary: Content of summary.json.
         model: Name of the model that predicts.
-        floor_mm: Mean position error that noise alone would leave.
+        floor_mm: Mean error that noise alone would leave.
+        errors_of: What errors in mm are of: "position" or "distance".
         drift: What changed since the last calibration; None where there is none.
         grave: The notices that need attention.
         files: The files of its measurements.
@@ -58,6 +59,7 @@ class ArmMade:
     summary: dict[str, Any]
     model: str
     floor_mm: float
+    errors_of: str
     drift: dict[str, Any] | None
     grave: list[str]
     files: list[str]
@@ -82,6 +84,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         summary=made.summary,
         model=made.model_name,
         floor_mm=distance_at_floor_mm(made),
+        errors_of=made.selection.errors_of,
         drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
         files=task.data.files,
