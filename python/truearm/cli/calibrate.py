@@ -240,8 +240,7 @@ def print_results(calibration: "Calibration") -> None:
         trained += " (--holdout draws others)"
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
-    of = "distance" if calibration.selection.distances else "position"
-    print_errors(validation.holdout, _judged_in_words(calibration), of)
+    print_errors(validation.holdout, _judged_in_words(calibration), calibration.selection.errors_of)
     if validation.drift is not None:
         say_wrapped(validation.drift.words)
     if validation.few:

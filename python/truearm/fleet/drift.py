@@ -77,6 +77,7 @@ def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dic
         "share_beyond": None if uncertain_m is None else float(np.mean(change_m[some] > SURE * uncertain_m)),
         "moved": list(_moved(previous, now)),
         "previous_mean_mm": known_mean_mm(previous),
+        "previous_errors_of": previous.selection.errors_of,
     }
 
 

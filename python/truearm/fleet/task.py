@@ -49,7 +49,8 @@ class ArmMade:
         summary: Content of summary.json.
         model: Name of the model that predicts.
         means_mm: Mean errors of the models on held-out rows, without outliers where these are known.
-        floor_mm: Mean position error that noise alone would leave.
+        floor_mm: Mean error that noise alone would leave.
+        errors_of: What errors in mm are of: "position" or "distance".
         drift: What changed since the last calibration; None where there is none.
         grave: The notices that need attention.
         files: The files of its measurements.
@@ -61,6 +62,7 @@ class ArmMade:
     model: str
     means_mm: dict[str, float]
     floor_mm: float
+    errors_of: str
     drift: dict[str, Any] | None
     grave: list[str]
     files: list[str]
@@ -86,6 +88,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         model=made.model_name,
         means_mm=judged_means_mm(made.validation, Outliers.of(made)),
         floor_mm=distance_at_floor_mm(made),
+        errors_of=made.selection.errors_of,
         drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
         files=task.data.files,

@@ -80,7 +80,7 @@ class Facts:
     @property
     def error(self) -> str:
         """What errors are of: "distance error" or "position error"."""
-        return "distance error" if self.calibration.selection.distances else "position error"
+        return f"{self.calibration.selection.errors_of} error"
 
     @property
     def point_name(self) -> str:
