@@ -21,6 +21,7 @@ from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
     NO_HELP,
     SINGLE_ROWS,
+    WOULD_FIT,
     constant_is_better,
     doubts,
     mounting,
@@ -30,13 +31,14 @@ from truearm.doubts.of_results import (
     stated_too_large,
     stood_still,
 )
-from truearm.doubts.outliers import NO_OUTLIERS, Outliers
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, Outliers
 from truearm.doubts.plausibility import check_against
 from truearm.doubts.points_together import points_together
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
 from truearm.doubts.row_order import order_notices
 from truearm.doubts.turning_sense import check_turns
+from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.unexplained import unexplained
 from truearm.doubts.whitened import Whitened
@@ -88,6 +90,8 @@ ASTRAY: Final = 2.0
 """Ratio of the median errors of held-out rows, known and not, from which a fit went astray."""
 REFIT_ASTRAY: Final = "refit_astray"
 OPEN_SETUP: Final = "open_setup"
+WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *EXCHANGED, *WOULD_FIT}
+"""Notices of what spoils a fit, so that what it leaves of rows tells nothing else."""
 
 
 def calibrate(
@@ -157,16 +161,38 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
-    told = [*_doubts(task, found, given, stages), *_of_left(found, drift.progress[order])]
+    told = _told(task, found, (given, drift.progress[order]), stages)
     return replace(found, notices=(*found.notices, *told))
 
 
-def _of_left(found: Calibration, progress: Floats) -> list[Notice]:
+def _told(task: Task, found: Calibration, given: tuple[Measurements, Floats], stages: Stages) -> list[Notice]:
+    """What speaks against a calibration, and unless rows are wrong, what it leaves of them; `given` are all
+    rows, and the progress of the fitted ones (n,).
+    """
+    data, progress = given
+    told = _doubts(task, found, data, stages)
+    if {notice.kind for notice in told} & WRONG_ROWS:
+        return told
+    return [*told, *_of_left(task, found, progress)]
+
+
+def _of_left(task: Task, found: Calibration, progress: Floats) -> list[Notice]:
     """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
-    if found.rows is None or found.scheme is not None or found.selection.distances:
+    rows = found.rows
+    if rows is None or found.scheme is not None or found.selection.distances:
         return []
-    seen = Whitened.of(found, found.rows, progress)
-    return [*uneven_setups(found, found.rows, seen), *moved_joints(found, seen, progress)]
+    if may_be_bent(found) and rows.outliers():
+        found, rows = _unbent(task, found, rows)
+    seen = Whitened.of(found, rows, progress)
+    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress)]
+
+
+def _unbent(task: Task, found: Calibration, rows: FittedRows) -> tuple[Calibration, FittedRows]:
+    """The calibration with constants that its outliers do not bend, and the rows as these have them."""
+    fits = unbent(task, rows)
+    constant, models = _constant_details(task, fits), fits.models(task.arm)
+    told = replace(found, models=models, identifiability=fits.identifiability, constant=constant)
+    return told, FittedRows.of(fits, rows.side, task.selection)
 
 
 def _of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:

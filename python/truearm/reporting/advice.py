@@ -219,7 +219,9 @@ def _joints_moved(facts: Facts) -> Iterator[Advice]:
 
 def _uneven_setups(facts: Facts) -> Iterator[Advice]:
     if words := facts.noticed(UNEVEN_SETUPS):
-        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, 2.0 * facts.mean_mm())
+        # Outliers come first: without them there may be less to state.
+        weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
+        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, weight)
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:
