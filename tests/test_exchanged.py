@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.doubts.of_results import Outliers, to_check
+from truearm.doubts.of_results import to_check
+from truearm.doubts.outliers import Outliers
 from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT
 from truearm.reporting.facts import Facts
 from truearm.reporting.parts import Table

@@ -245,6 +245,7 @@ ROW: dict[str, Any] = {
     "robot": "UR10",
     "model": "variable",
     "rows": 100,
+    "errors_of": "position",
     "mean_mm": 0.1,
     "max_mm": 0.3,
     "noise_mm": 0.03,
@@ -256,7 +257,14 @@ ROW: dict[str, Any] = {
     "drift": None,
     "grave": [],
 }
-DRIFT = {"mean_mm": 0.2, "max_mm": 0.5, "std_mm": 0.3, "share_beyond": 0.0, "moved": []}
+DRIFT = {
+    "mean_mm": 0.2,
+    "max_mm": 0.5,
+    "std_mm": 0.3,
+    "share_beyond": 0.0,
+    "moved": [],
+    "previous_errors_of": "position",
+}
 SURE = {**DRIFT, "share_beyond": 0.9}
 
 

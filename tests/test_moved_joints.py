@@ -34,18 +34,29 @@ def told(arm, turned, columns, **options):
     return {notice.kind: str(notice) for notice in found.notices}, found
 
 
-def test_the_column_that_errors_go_with_is_named(arm):
-    notices, found = told(arm, np.outer(WARM, PER_KELVIN), {"temperature_C": 20.0 + WARM})
+def test_the_column_that_errors_go_with_is_named_though_cells_are_empty(arm):
+    seen = 20.0 + WARM + np.random.default_rng(2).normal(0.0, 0.3, ROWS)
+    seen[::15] = np.nan
+    notices, found = told(arm, np.outer(WARM, PER_KELVIN), {"temperature_C": seen})
     said = notices[UNUSED_COLUMN]
-    assert "--features temperature_C" in said
+    assert "rows have none" in said
+    assert "--features temperature_C, if it is known where programs run" in said
     assert "humidity" not in said
     assert JOINTS_MOVED not in notices
     assert said in {advice.words for advice in report(found).advice}
 
 
+def test_a_column_that_goes_with_the_time_is_not_told_from_it_and_numbers_of_rows_are_none(arm):
+    columns = {"id": np.arange(ROWS) + 1.0, "pose": np.arange(ROWS) % 50, "temperature_C": 20.0 + WARM}
+    notices, _ = told(arm, np.outer(WARM, PER_KELVIN), columns)
+    assert UNUSED_COLUMN not in notices
+    assert "temperature_C goes one way meanwhile" in notices[JOINTS_MOVED]
+    assert "--features temperature_C" in notices[JOINTS_MOVED]
+
+
 def test_joints_that_move_while_they_are_measured_are_told(arm):
     turned = np.outer(WARM, PER_KELVIN)
-    notices, _ = told(arm, turned, {})
+    notices, _ = told(arm, turned, {"id": np.arange(ROWS) + 1.0})
     assert UNUSED_COLUMN not in notices
     assert "--drift none" in notices[JOINTS_MOVED]
     assert JOINTS_MOVED not in told(arm, turned, {}, drift="none")[0]
@@ -79,8 +90,9 @@ def test_what_chance_explains_is_as_likely_as_it_is():
     for _ in range(200):
         noise = rng.normal(size=visits * width)
         left = (noise - taken @ noise).reshape(visits, width)
-        root, held = np.broadcast_to(np.eye(width), (visits, width, width)), np.ones_like(left, dtype=bool)
-        seen = Whitened(np.arange(visits), left, held, root, taken, np.zeros((visits, width, 6)))
+        root, shots = np.broadcast_to(np.eye(width), (visits, width, width)), np.ones_like(left)
+        nothing = np.zeros((visits, width, 6))
+        seen = Whitened(np.arange(visits), left, shots, root, taken, nothing, np.ones_like(left))
         found.append(seen.explained(rng.normal(size=(visits, width, 6)))[0])
     assert np.quantile(found, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.08)
 
@@ -89,8 +101,9 @@ def test_what_columns_do_is_found_with_its_size():
     rng = np.random.default_rng(3)
     columns, by = rng.normal(size=(50, 3, 2)), np.array([0.5, -1.0])
     noise = 0.1 * rng.normal(size=(50, 3))
-    root, held = np.broadcast_to(np.eye(3), (50, 3, 3)), np.ones((50, 3), dtype=bool)
-    seen = Whitened(np.arange(50), columns @ by + noise, held, root, np.zeros((150, 150)), columns)
+    root, ones = np.broadcast_to(np.eye(3), (50, 3, 3)), np.ones((50, 3))
+    left = columns @ by + noise
+    seen = Whitened(np.arange(50), left, ones, root, np.zeros((150, 150)), columns, ones)
     chance, found = seen.explained(columns)
     assert chance < 1e-20
     assert found == pytest.approx(by, abs=0.05)

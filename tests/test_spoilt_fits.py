@@ -7,7 +7,8 @@ import pytest
 
 import truearm as ta
 from truearm import calibrating
-from truearm.doubts.of_results import SURE, Outliers, constant_is_better
+from truearm.doubts.of_results import SURE, constant_is_better
+from truearm.doubts.outliers import Outliers
 from truearm.fits.fitting import fit_rows
 from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.judgement.held_rows import HeldRows

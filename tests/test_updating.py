@@ -18,6 +18,7 @@ from tests.remastered import (
 )
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
+from truearm.doubts.of_results import LARGE_MM
 from truearm.errors import Notice
 from truearm.fits.core_set import Selection
 from truearm.programs.notices import update_notices
@@ -179,6 +180,24 @@ def test_a_gross_error_is_left_out_and_named(known):
     assert any("row 4" in str(notice) for notice in found.notices)
     check_kept_notices(found, calibration)
     assert error_mm(found.calibration, arm, SHIFT) < 0.2
+
+
+def test_a_gross_row_that_was_held_out_gives_up_no_calibration_that_it_did_not_bend(known):
+    arm, _ = known
+    data = arm.measure(arm.poses(60))
+    held = ta.calibrate(arm.robot, data, model="constant").held
+    assert held is not None
+    targets = data.targets.copy()
+    targets[held.rows[0] - 1] = 0.0
+    without, bent = (
+        ta.calibrate(arm.robot, replace(data, targets=targets), model="constant", refit=refit)
+        for refit in (False, True)
+    )
+    later = arm.measure(arm.poses(15, seed=9), seed=9)
+    assert without.validation.holdout["constant"].position.mean > LARGE_MM
+    assert ta.update(without, later).verdict == "holds"
+    with pytest.raises(ta.WorkError, match=r"leaves \d+ mm of the rows that it was fitted to"):
+        ta.update(bent, later)
 
 
 def test_constants_are_updated_too(known):

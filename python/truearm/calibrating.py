@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm.calibration import Calibration
-from truearm.certainty.standard_errors import counted_covariance, standard_errors
+from truearm.certainty.standard_errors import constant_details
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.doubts.admitted import admitted
-from truearm.doubts.of_calibration import of_fit, of_left, of_result, of_split
+from truearm.doubts.of_calibration import of_fit, of_result, of_split
 from truearm.doubts.of_results import orientations_left_out, seen_at_values, stood_still
 from truearm.doubts.row_order import order_notices
 from truearm.doubts.turning_sense import check_turns
@@ -34,7 +34,6 @@ from truearm.fits.fitting import (
     fit_rows,
 )
 from truearm.fits.identified import IdentifiedArm
-from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import MeasuredParts, sureness
 from truearm.fits.models import NOMINAL, VARIABLE
 from truearm.fits.options import Options
@@ -128,7 +127,7 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
-    told = [*of_result(task, found, given, stages), *of_left(found, drift.progress[order])]
+    told = of_result(task, found, (given, drift.progress[order]), stages)
     return replace(found, notices=(*found.notices, *told))
 
 
@@ -303,15 +302,8 @@ def _details(
     task: Task, final: Fits, searched: Fits
 ) -> tuple[ConstantDetails, VariableDetails | None, MeasuredParts]:
     """More about both models, and what of what was fitted the set-ups measured."""
-    constant, variable = _constant_details(task, final), _variable_details(task, final, searched)
+    constant, variable = constant_details(task, final), _variable_details(task, final, searched)
     return constant, variable, _measured(task, final, left_m(constant, variable))
-
-
-def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
-    names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
-    common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
-    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
-    return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

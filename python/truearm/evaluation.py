@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,15 @@ from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts.admitted import admitted
 from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
-from truearm.doubts.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
+from truearm.doubts.gross_rows import (
+    FAR_ROWS,
+    Expected,
+    gross_frame_rows,
+    gross_judged_rows,
+    gross_rows_told,
+)
 from truearm.doubts.of_results import NO_HELP, no_help
+from truearm.doubts.outliers import known_mean_mm
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
@@ -47,6 +54,10 @@ from truearm.units import MM_PER_METRE
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+ELSEWHERE: Final = 0.1
+"""Share of the error that is left with frame and tool found anew where these are elsewhere, whatever else is
+not as it was: of what a joint that moved does they take up less than half, or, of the first and last, all."""
 
 
 @dataclass(frozen=True)
@@ -266,22 +277,23 @@ def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> l
 def _moved(
     calibration: Calibration, data: Measurements, options: EvaluationOptions, kept: RowErrors
 ) -> list[Notice]:
-    """A warning that the instrument or the tool is elsewhere, where the calibration helps with both found
-    anew; none where that cannot be, or does not help either.
+    """A warning that the instrument or the tool is elsewhere, where the calibration fits with both found
+    anew, or misses far less; with it, if so, that the arm is not as it was either. None where neither can be
+    found, or the calibration does not help then.
     """
     try:
         anew = evaluate(calibration, data, replace(options, keep_frames=False, keep_tool=False))
     except (InputError, WorkError):
         return []
     best = calibration.model_name
-    known = calibration.validation.holdout.get(best)
-    misses = {NO_HELP, FAR_ROWS, NOT_AS_CALIBRATED} & {notice.kind for notice in anew.notices}
-    if anew.rows is None or known is None or misses:
+    known_mm, misses = known_mean_mm(calibration), {notice.kind for notice in anew.notices}
+    if anew.rows is None or known_mm is None or {NO_HELP, FAR_ROWS} & misses:
         return []
     before, after = (
         MM_PER_METRE * float(np.nanmedian(errors.distance_m)) for errors in (kept, anew.rows.errors[best])
     )
-    if after > min(before, AS_KNOWN * known.position.mean):
+    fits = NOT_AS_CALIBRATED not in misses and after <= AS_KNOWN * known_mm
+    if after > (1.0 if fits else ELSEWHERE) * before:
         return []
     given = {"--keep-frames": options.keep_frames, "--keep-tool": options.keep_tool}
     with_frame = options.keep_frames and not calibration.arm.world_is_known
@@ -289,10 +301,16 @@ def _moved(
     where = "instrument or the target stands" if with_frame else "target sits"
     text = (
         f"With the {what} of the calibration the median error is {length_mm(before, 4)}, with what can be "
-        f"found anew {length_mm(after, 4)}: the {where} elsewhere than then, and the calibration itself "
-        f"fits. Leave {' and '.join(option for option, is_given in given.items() if is_given)} out."
+        f"found anew {length_mm(after, 4)}: the {where} elsewhere than then"
+        f"{', and the calibration itself fits' if fits else ''}. "
+        f"Leave {' and '.join(option for option, is_given in given.items() if is_given)} out."
     )
-    return [Notice("setup_moved", text)]
+    beside = [
+        Notice(notice.kind, f"With what can be found anew: {notice.message[0].lower()}{notice.message[1:]}")
+        for notice in anew.notices
+        if notice.kind == NOT_AS_CALIBRATED
+    ]
+    return [Notice("setup_moved", text), *beside]
 
 
 def _gross(
@@ -312,8 +330,9 @@ def _gross(
     of_frame = Expected(task, calibration, model, frame, **finds)
     judged = Expected(task, calibration, model, held[0], **finds)
     once = replace(of_frame, data=frame.select(np.unique(pose_numbers(frame.readings, frame.group))))
-    outliers = gross_judged_rows(judged, once, held[1])
-    changed = not_as_calibrated(judged, once, held[1])
+    gross = gross_judged_rows(judged, once, held[1])
+    outliers = gross_rows_told(gross, held[0], held[1])
+    changed = not_as_calibrated(judged, once, held[1], gross)
     if finds["finds_tool"]:
         setup = fit_setup(task, frame, of_frame.parameters, robust="cauchy").setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))

@@ -12,6 +12,7 @@ from truearm.cell.checks import unsure_steps
 from truearm.cell.poses_file import GROUP
 from truearm.cell.session import Session
 from truearm.measurements import Measurements
+from truearm.tables.columns import APPROACH, POSE, PURPOSE, READINGS
 
 Floats = NDArray[np.float64]
 
@@ -89,9 +90,9 @@ def points_and_joints(session: Session, kind: str) -> tuple[list[int], Floats, F
 def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
     first = rows[0]
     joints = np.mean([json.loads(row["joints"]) for row in rows], axis=0)
-    merged: dict[str, Any] = {"step": first["step"], "pose": first["pose"] + 1}
+    merged: dict[str, Any] = {"step": first["step"], POSE: first["pose"] + 1}
     if first["purpose"]:
-        merged["purpose"] = first["purpose"]
+        merged[PURPOSE] = first["purpose"]
     merged |= {f"q{j + 1}": value for j, value in enumerate(joints.tolist())}
     merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
     merged["sigma"] = float(np.mean([row["sigma"] for row in rows]) / np.sqrt(len(rows)))
@@ -101,7 +102,7 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
         turns *= np.where(turns @ turns[0] < 0.0, -1.0, 1.0)[:, None]
         turn = turns.mean(axis=0)
         merged |= dict(zip(TURN, (turn / np.linalg.norm(turn)).tolist(), strict=True))
-    merged |= {"approach": first["approach"], "readings": len(rows)}
+    merged |= {APPROACH: first["approach"], READINGS: len(rows)}
     further = [{"temperature_c": row["temperature_c"]} | json.loads(row["features"]) for row in rows]
     return merged | _means(further)
 

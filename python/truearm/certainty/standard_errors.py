@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from truearm._core import linearise, setup_jacobian
 from truearm.fits.core_set import core_set, distances_apart
+from truearm.fits.details import ConstantDetails
 from truearm.fits.fitting import Fits, Task, constant_variances
-from truearm.fits.known_scale import common_share
+from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import held_parts
 from truearm.rows.shots import variance_factor
 from truearm.rows.visits import pose_numbers
@@ -98,3 +99,11 @@ def standard_errors(task: Task, fits: Fits, covariance: Floats) -> Floats:
     chosen = [column_of[name] for name in names]
     known = np.array([variances[column] for column in chosen])
     return np.asarray(np.sqrt(apart[chosen] ** 2 + np.maximum(known, 0.0)))
+
+
+def constant_details(task: Task, fits: Fits) -> ConstantDetails:
+    """What a fit found beside its constants, with how far these are off."""
+    names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
+    common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
+    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
+    return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)

@@ -241,8 +241,7 @@ def print_results(calibration: "Calibration") -> None:
         trained += " (--holdout draws others)"
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
-    of = "distance" if calibration.selection.distances else "position"
-    print_errors(validation.holdout, _judged_in_words(calibration), of)
+    print_errors(validation.holdout, _judged_in_words(calibration), calibration.selection.errors_of)
     if validation.drift is not None:
         say_wrapped(validation.drift.words)
     if validation.few:
@@ -333,7 +332,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
-    from truearm.doubts.of_results import Outliers
+    from truearm.doubts.outliers import Outliers
     from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT, fate_of_outliers
 
     if not outliers or calibration.rows is None:

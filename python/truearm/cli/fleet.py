@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from truearm.fleet import Fleet, FleetRun
     from truearm.fleet.rows import Judged
 
-COLUMNS = ("arm", "verdict", "mean", "max", "nominal", "drift", "at most")
+COLUMNS = ("arm", "verdict", "errors of", "mean", "max", "nominal", "drift", "at most")
 
 
 def command(
@@ -74,7 +74,7 @@ def _print(run: "FleetRun", output: Path, *, again: str) -> None:
 
     if run.done_before:
         say(f"{run.done_before} of {len(run.arms)} arms were finished before.")
-    print_table(COLUMNS, [_cells(arm) for arm in run.arms], title="Errors and drift, mm", left=(0, 1))
+    print_table(COLUMNS, [_cells(arm) for arm in run.arms], title="Errors and drift, mm", left=(0, 1, 2))
     for arm in run.arms:
         if arm.reasons:
             say_wrapped(f"{arm.row['arm']}: {' '.join(reason.words for reason in arm.reasons)}")
@@ -91,4 +91,5 @@ def _cells(arm: "Judged") -> list[str]:
     row, drift = arm.row, arm.row.get("drift") or {}
     numbers = [row.get(key) for key in ("mean_mm", "max_mm", "nominal_mean_mm")]
     numbers += [drift.get(key) for key in ("mean_mm", "max_mm")]
-    return [row["arm"], arm.verdict, *("" if value is None else f"{value:.3f}" for value in numbers)]
+    shown = ["" if value is None else f"{value:.3f}" for value in numbers]
+    return [row["arm"], arm.verdict, row.get("errors_of", ""), *shown]

@@ -1,6 +1,7 @@
 """Whether an arm is still as it was calibrated, as far as rows of an evaluation tell."""
 
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from truearm.calibration import Calibration
 from truearm.doubts.gross_rows import AXES, Expected, widened
 from truearm.doubts.nominal_misfit import some_rows
+from truearm.doubts.outliers import Outliers, known_mean_mm
 from truearm.errors import Notice
 from truearm.judgement.held_rows import HeldRows
 from truearm.lengths import length_mm
@@ -17,7 +19,8 @@ Floats = NDArray[np.float64]
 
 NOT_AS_CALIBRATED: Final = "not_as_calibrated"
 AS_KNOWN: Final = 2.0
-"""A calibration whose error is within this factor of that on its own held-out rows fits."""
+"""A calibration whose error is within this factor of that on its own held-out rows fits; outliers are no part
+of either."""
 WITHIN_95: Final = float(np.sqrt(7.815 / AXES))
 """Times its root mean square that 95 of 100 lengths of three normal coordinates are within."""
 HALF: Final = 0.5
@@ -25,29 +28,34 @@ MOST_ROWS: Final = 200
 """Rows at the most that are compared with what was expected there."""
 
 
-def not_as_calibrated(found: Expected, frame: Expected, held: HeldRows) -> list[Notice]:
+def not_as_calibrated(
+    found: Expected, frame: Expected, held: HeldRows, gross: Sequence[Mapping[str, Any]] = ()
+) -> list[Notice]:
     """A warning where the calibration plainly misses more than it knows of itself.
 
-    The mean error is more than twice that on its own held-out rows, and most rows are beyond the 95 %
-    intervals of its standard deviations and noise.
+    The mean error is more than twice that on its own held-out rows, outliers left out of both, and most rows
+    are beyond the 95 % intervals of its standard deviations and noise.
 
     Args:
         found: The judged rows, the model in the set-ups it is judged in.
         frame: The rows that found these set-ups, in the same ones.
         held: The judged rows with the errors that are published.
+        gross: Those of them that hold gross errors, each with file and row.
     """
-    calibration, best = found.calibration, found.calibration.model_name
-    known = calibration.validation.holdout.get(best)
-    mean_mm = MM_PER_METRE * float(np.nanmean(held.errors[best].distance_m))
-    if known is None or mean_mm <= AS_KNOWN * known.position.mean:
+    best, known_mm = found.calibration.model_name, known_mean_mm(found.calibration)
+    all_mm = MM_PER_METRE * float(np.nanmean(held.errors[best].distance_m))
+    mean_mm = held.means_without_mm(gross).get(best, all_mm)
+    if known_mm is None or mean_mm <= AS_KNOWN * known_mm:
         return []
     share = _share_beyond(found, frame, held.errors[best].position)
     if share <= HALF:
         return []
+    own = Outliers.of(found.calibration).means_mm
+    here, there = (" without outliers" if each else "" for each in (gross, own))
     text = (
         "The arm, its tool or the set-up is not as it was calibrated, or the instrument scatters more: the "
-        f"mean error is {length_mm(mean_mm, 4)}, {length_mm(known.position.mean, 4)} on the calibration's "
-        f"own held-out rows, and {100.0 * share:.0f} % of the rows are farther off than its standard "
+        f"mean error{here} is {length_mm(mean_mm, 4)}, {length_mm(known_mm, 4)} on the calibration's own "
+        f"held-out rows{there}, and {100.0 * share:.0f} % of the rows are farther off than its standard "
         "deviations and noise allow 5 % to be."
     )
     return [Notice(NOT_AS_CALIBRATED, text)]

@@ -1,19 +1,19 @@
 """Outliers that are none: points that fit the readings of other rows, or another target of their own row."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.doubts.of_results import ROWS_EXCHANGED, TARGETS_EXCHANGED
+from truearm.doubts.outliers import ROWS_EXCHANGED, TARGETS_EXCHANGED
+from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
-from truearm.fits.fitting import Task, fit_rows
+from truearm.fits.fitting import Task
 from truearm.fits.models import CONSTANT, ArmModel
 from truearm.lengths import length_mm
 from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
-from truearm.stages import no_stages
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ FARTHER: Final = 10.0
 """It is so many times farther off than that where it stands."""
 MOST: Final = 300
 """Points that are compared with one another: what more outliers are is no exchange."""
-UNBENT: Final = "cauchy"
-"""Loss of constants that rows far off do not bend."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +53,13 @@ def exchanges(task: Task, found: "Calibration", *, doubted: bool) -> Exchanges:
     if rows is None or found.selection.distances:
         return Exchanges()
     notices = _notices(found, rows, found.model)
-    may_be_bent = found.variable is None and found.options.robust != UNBENT
-    if notices or not may_be_bent or not (doubted or rows.outliers()):
+    if notices or not may_be_bent(found) or not (doubted or rows.outliers()):
         return Exchanges(notices)
-    options = replace(task.options, model=CONSTANT, robust=UNBENT)
-    robustly = replace(task, options=options, starts=(), stages=no_stages)
     with task.stages("looking for exchanged rows"):
-        fits = fit_rows(robustly, rows.fitted)
-    unbent = fits.models(task.arm)[CONSTANT]
-    notices = _notices(found, FittedRows.of(fits, rows.side, found.selection), unbent)
-    return Exchanges(notices, unbent if notices else None)
+        fits = unbent(task, rows)
+    model = fits.models(task.arm)[CONSTANT]
+    notices = _notices(found, FittedRows.of(fits, rows.side, found.selection), model)
+    return Exchanges(notices, model if notices else None)
 
 
 def _notices(found: "Calibration", rows: FittedRows, model: ArmModel) -> tuple[Notice, ...]:

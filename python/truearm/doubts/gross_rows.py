@@ -151,8 +151,8 @@ def gross_frame_rows(found: Expected) -> list[Notice]:
     return [Notice(FAR_ROWS, text, tuple(entry["row"] for entry in entries))]
 
 
-def gross_judged_rows(found: Expected, frame: Expected, held: HeldRows) -> list[Notice]:
-    """A notice of gross errors among judged rows, with the errors without them.
+def gross_judged_rows(found: Expected, frame: Expected, held: HeldRows) -> list[Entry]:
+    """Gross errors among judged rows, the farthest first: file, row and distance_mm of each.
 
     Args:
         found: The judged rows, the model in the set-ups it is judged in.
@@ -171,12 +171,16 @@ def gross_judged_rows(found: Expected, frame: Expected, held: HeldRows) -> list[
             row = int(rows[place])
             if lengths[place] > FAR * found.lengths_m(np.array([row]))[0]:
                 far[row] = float(np.linalg.norm(errors[row]))
-    if not far:
+    return _entries(found.data, far)
+
+
+def gross_rows_told(entries: Sequence[Entry], data: Measurements, held: HeldRows) -> list[Notice]:
+    """A notice of the gross errors among judged rows, with the errors without them."""
+    if not entries:
         return []
-    entries = _entries(found.data, far)
     said = ", ".join(f"{name} {mean:.3f}" for name, mean in held.means_without_mm(entries).items())
     text = (
-        f"Outliers among the rows that were judged, {RULE}: {_named(entries, found.data)}. Mean error "
+        f"Outliers among the rows that were judged, {RULE}: {_named(entries, data)}. Mean error "
         f"without them: {said} mm. They count in all other errors: look at them, or take them out."
     )
     return [Notice(OUTLIERS, text, tuple(entry["row"] for entry in entries))]

@@ -5,7 +5,7 @@ amount that goes with a temperature or with the time. Where no feature tells the
 noise. What each joint is off is asked for in what the model leaves of the rows.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,10 +16,11 @@ from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
 from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, poses_of, share_explained
 from truearm.doubts.whitened import AXES, Whitened
-from truearm.errors import Notice
+from truearm.errors import Notice, count_of
 from truearm.fits.fitted_rows import FittedRows
 from truearm.inputs import is_payload
 from truearm.lengths import length_mm
+from truearm.tables.columns import OF_MEASURING
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -32,17 +33,28 @@ ORDER: Final = ""
 """Name of the order of the rows among the columns."""
 
 
+MOSTLY: Final = 0.5
+"""Share of the steps from visit to visit at which what goes with the time changes."""
+EVEN: Final = 1e-4
+"""Part of their range by which values differ at the most from what counts rows."""
+KNOWN: Final = "known where programs run, as a temperature is and a time is not"
+
+
 @dataclass(frozen=True, eq=False)
 class Asked:
     """A column that joints may move with.
 
     Attributes:
         name: Its name.
-        values: Of each visit (v,), from zero in the mean of each set-up.
+        values: Of each visit (v,), from zero in the mean of each set-up; zero where there is none.
+        lacking: How many rows have none.
+        as_time: Whether it goes one way while a set-up is measured, so that it cannot be told from the time.
     """
 
     name: str
     values: Floats
+    lacking: int = 0
+    as_time: bool = False
 
     @property
     def reach(self) -> float:
@@ -55,63 +67,98 @@ class Moved:
     """A column that joints move with.
 
     Attributes:
-        name: Its name.
+        column: The column.
         chance: How likely chance explains as much.
         mean_mm: How far the target moves on average, from the lowest value to the highest.
     """
 
-    name: str
+    column: Asked
     chance: float
     mean_mm: float
 
     @property
     def words(self) -> str:
-        """Its name, and how far."""
-        return f"{self.name} (by {length_mm(self.mean_mm, 2)} from its lowest value to its highest)"
+        """Its name, how far, and where it is not known."""
+        lacking = self.column.lacking
+        empty = f"; {count_of(lacking, 'row')} {'has' if lacking == 1 else 'have'} none" if lacking else ""
+        far = length_mm(self.mean_mm, 2)
+        return f"{self.column.name} (by {far} from its lowest value to its highest{empty})"
 
 
-def moved_joints(found: Calibration, seen: Whitened, progress: Floats) -> list[Notice]:
+def moved_joints(found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats) -> list[Notice]:
     """A warning where joints move with a column that is not used, or with the order of the rows.
 
     Args:
         found: A calibration of what varies: constants leave too much that poses explain.
-        seen: What it leaves of its rows.
+        rows: The rows that it was fitted to.
+        seen: What it leaves of them.
         progress: When each of them was measured, from 0 for the first of its set-up to 1 for the last (n,).
     """
-    if found.rows is None or found.variable is None or len(seen.rows) < FEWEST_VISITS:
+    if found.variable is None or len(seen.rows) < FEWEST_VISITS:
         return []
-    asked = list(_asked(found, found.rows, seen, progress))
+    asked = list(_asked(found, rows, seen, progress))
     told = [
         moved for column in asked if (moved := _moved(found, seen, column)).chance * len(asked) < OVERWHELMING
     ]
-    columns = sorted((moved for moved in told if moved.name != ORDER), key=lambda moved: moved.chance)
-    if columns:
+    told.sort(key=lambda moved: moved.chance)
+    if columns := [moved for moved in told if not moved.column.as_time]:
         return [_with_columns(columns)]
-    return [_while_measured(moved) for moved in told]
+    return [_while_measured(told)] if told else []
 
 
 def _asked(found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats) -> Iterator[Asked]:
     """Columns that vary and no pose tells, and the order of the rows where they have one."""
-    data = rows.data.select(seen.rows)
-    named = {
-        str(name): data.features[name].to_numpy(np.float64)
-        for name in data.features.columns
-        if name not in found.options.features
-    }
-    if found.options.drift != NO_DRIFT and all(notice.kind != ORDER_OF_POSES for notice in found.notices):
-        # What warms up moves most at first.
-        named[ORDER] = np.sqrt(progress[seen.rows])
-    poses = poses_of(found.robot, data.readings)
-    for name, values in named.items():
-        if not np.isfinite(values).all():
+    group, when = rows.data.group[seen.rows], progress[seen.rows]
+    poses, in_order = poses_of(found.robot, rows.data.readings[seen.rows]), _is_in_order(found)
+    # What warms up moves most at first.
+    for name, every in _columns(found, rows, np.sqrt(progress) if in_order else None):
+        values = every[seen.rows]
+        known = np.isfinite(values)
+        own = [known & (group == each) for each in np.unique(group[known])]
+        if known.sum() < FEWEST_VISITS:
             continue
-        centred = values.copy()
-        for group in data.groups:
-            own = data.group == group
-            centred[own] -= values[own].mean()
-        column = Asked(name, centred)
-        if column.reach > 0.0 and share_explained(poses, centred) <= FOLLOWED:
-            yield column
+        if name != ORDER and _counts_rows([(values[each], when[each]) for each in own]):
+            continue
+        centred = np.zeros(len(values))
+        for each in own:
+            centred[each] = values[each] - values[each].mean()
+        if np.ptp(centred) > 0.0 and share_explained(poses[known], centred[known]) <= FOLLOWED:
+            as_time = in_order and _goes_one_way([values[each] for each in own])
+            yield Asked(name, centred, int((~np.isfinite(every)).sum()), as_time)
+
+
+def _is_in_order(found: Calibration) -> bool:
+    """Whether rows are in the order of measuring, and that is none of their poses."""
+    is_told = any(notice.kind == ORDER_OF_POSES for notice in found.notices)
+    return found.options.drift != NO_DRIFT and not is_told
+
+
+def _columns(found: Calibration, rows: FittedRows, order: Floats | None) -> Iterator[tuple[str, Floats]]:
+    """Names and values (n,) of columns that are no features, and of the order of rows if they have one."""
+    if order is not None:
+        yield ORDER, order
+    for name in map(str, rows.data.features.columns):
+        if name not in (*found.options.features, *OF_MEASURING):
+            yield name, rows.data.features[name].to_numpy(np.float64)
+
+
+def _counts_rows(in_set_ups: Sequence[tuple[Floats, Floats]]) -> bool:
+    """Whether values (v,) of each set-up are no more than the progress (v,) of measuring, as numbers of rows
+    are.
+    """
+    for values, progress in in_set_ups:
+        reach, span = values[-1] - values[0], progress[-1] - progress[0]
+        straight = values[0] + reach * (progress - progress[0]) / (span or 1.0)
+        if np.abs(values - straight).max() > EVEN * np.ptp(values):
+            return False
+    return True
+
+
+def _goes_one_way(in_set_ups: Sequence[Floats]) -> bool:
+    """Whether values (v,) of each set-up, in the order of measuring, rise all the while, or fall."""
+    steps = [np.diff(values) for values in in_set_ups]
+    changes = np.concatenate(steps) != 0.0
+    return bool(changes.mean() > MOSTLY) and all((each >= 0.0).all() or (each <= 0.0).all() for each in steps)
 
 
 def _moved(found: Calibration, seen: Whitened, column: Asked) -> Moved:
@@ -123,27 +170,42 @@ def _moved(found: Calibration, seen: Whitened, column: Asked) -> Moved:
         )
     chance, turned = seen.explained(by_joints * column.values[:, None, None])
     way = np.linalg.norm((by_joints @ turned)[:, :AXES], axis=1)
-    return Moved(column.name, chance, float(MM_PER_METRE * column.reach * way.mean()))
+    return Moved(column, chance, float(MM_PER_METRE * column.reach * way.mean()))
 
 
 def _with_columns(columns: list[Moved]) -> Notice:
     several = len(columns) > 1
     names = " and ".join(moved.words for moved in columns)
-    which = "NAME, of one that is known where programs run" if several else columns[0].name
+    which = f"NAME, of one that is {KNOWN}" if several else f"{columns[0].column.name}, if it is {KNOWN}"
     text = (
         f"Errors go with {names}, as of joints that move with {'them' if several else 'it'}, and no pose "
         "explains it: it is taken for noise, and intervals may be too narrow. Calibrate with --features "
-        f"{which}."
+        f"{which}{_to_fill(columns)}."
     )
     return Notice(UNUSED_COLUMN, text)
 
 
-def _while_measured(moved: Moved) -> Notice:
+def _to_fill(columns: list[Moved]) -> str:
+    """What a feature needs that rows lack."""
+    lack = any(moved.column.lacking for moved in columns)
+    return ", and its empty cells filled in or their rows left out" if lack else ""
+
+
+def _while_measured(told: list[Moved]) -> Notice:
+    """Of what cannot be told from the time, the likeliest first."""
+    named = [moved for moved in told if moved.column.name != ORDER]
+    also = ", or note its temperature in a column and calibrate with --features."
+    if named:
+        names = " and ".join(moved.column.name for moved in named)
+        go, which = ("go", "NAME") if len(named) > 1 else ("goes", names)
+        also = (
+            f". {names} {go} one way meanwhile, as the time does, and these rows do not tell them apart: if "
+            f"it is what moves the joints, and {KNOWN}, calibrate with --features {which}{_to_fill(named)}."
+        )
     text = (
         "The joints moved while they were measured, whatever the pose, as those of an arm that warms up: "
-        f"from the first row to the last the target by {length_mm(moved.mean_mm, 2)} on average. It is taken "
-        "for noise, and intervals may be too narrow. Warm the arm up before measuring, or note its "
-        "temperature in a column and calibrate with --features. Rows are taken to be in the order of "
-        "measuring: if they are not, give --drift none."
+        f"from the first row to the last the target by {length_mm(told[0].mean_mm, 2)} on average. It is "
+        f"taken for noise, and intervals may be too narrow. Warm the arm up before measuring{also} Rows are "
+        "taken to be in the order of measuring: if they are not, give --drift none."
     )
     return Notice(JOINTS_MOVED, text)

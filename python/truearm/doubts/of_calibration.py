@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
+from truearm.certainty.standard_errors import constant_details
 from truearm.doubts.conventions import fits_otherwise
 from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
@@ -17,21 +18,24 @@ from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
     NO_HELP,
     SINGLE_ROWS,
-    Outliers,
+    WOULD_FIT,
     constant_is_better,
     doubts,
     mounting,
     poses_aside,
     stated_too_large,
 )
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, Outliers
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
 from truearm.fits.details import VariableDetails, left_m
 from truearm.fits.endpoints import at_tool
 from truearm.fits.enough_values import group_unknowns
+from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.fitting import Fits, Task
 from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
@@ -45,6 +49,8 @@ from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
 Floats = NDArray[np.float64]
 
 OPEN_SETUP: Final = "open_setup"
+WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *EXCHANGED, *WOULD_FIT}
+"""Notices of what spoils a fit, so that what it leaves of rows tells nothing else."""
 
 
 def of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
@@ -79,15 +85,39 @@ def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[
     return [Notice(OPEN_SETUP, text)]
 
 
-def of_left(found: Calibration, progress: Floats) -> list[Notice]:
+def of_result(
+    task: Task, found: Calibration, given: tuple[Measurements, Floats], stages: Stages
+) -> list[Notice]:
+    """What speaks against a calibration, and unless rows are wrong, what it leaves of them; `given` are all
+    rows, and the progress of the fitted ones (n,).
+    """
+    data, progress = given
+    told = _doubted(task, found, data, stages)
+    if {notice.kind for notice in told} & WRONG_ROWS:
+        return told
+    return [*told, *_of_left(task, found, progress)]
+
+
+def _of_left(task: Task, found: Calibration, progress: Floats) -> list[Notice]:
     """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
-    if found.rows is None or found.scheme is not None or found.selection.distances:
+    rows = found.rows
+    if rows is None or found.scheme is not None or found.selection.distances:
         return []
-    seen = Whitened.of(found, found.rows, progress)
-    return [*uneven_setups(found, found.rows, seen), *moved_joints(found, seen, progress)]
+    if may_be_bent(found) and rows.outliers():
+        found, rows = _unbent(task, found, rows)
+    seen = Whitened.of(found, rows, progress)
+    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress)]
 
 
-def of_result(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
+def _unbent(task: Task, found: Calibration, rows: FittedRows) -> tuple[Calibration, FittedRows]:
+    """The calibration with constants that its outliers do not bend, and the rows as these have them."""
+    fits = unbent(task, rows)
+    constant, models = constant_details(task, fits), fits.models(task.arm)
+    told = replace(found, models=models, identifiability=fits.identifiability, constant=constant)
+    return told, FittedRows.of(fits, rows.side, task.selection)
+
+
+def _doubted(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
     """What makes a calibration doubtful; where it does not help, or found another arm, with what would
     fit instead.
     """
@@ -96,7 +126,7 @@ def of_result(task: Task, found: Calibration, data: Measurements, stages: Stages
         with stages("looking for lost rows"):
             shifted = fits_shifted(task, data)
     if shifted:
-        doubted = _of_errors(task, found, data, None)
+        doubted = _of_errors(task, found, data, NO_OUTLIERS)
         return [*doubted[:1], *shifted, *doubted[1:]]
     framed = _framed(task, found)
     exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
@@ -126,7 +156,7 @@ def _of_errors(
     task: Task,
     found: Calibration,
     data: Measurements,
-    outliers: Outliers | None,
+    outliers: Outliers,
     unbent: ArmModel | None = None,
 ) -> list[Notice]:
     """What the errors of a calibration say against it, and which outliers may be to blame.
@@ -139,7 +169,7 @@ def _of_errors(
     return [
         *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
         *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data, judged, best, points),
+        *stated_too_large(data, judged, best, points, outliers),
         *constant_is_better(judged, best, points, outliers),
         *_rounded(found, data),
     ]

@@ -1,8 +1,7 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 from truearm.doubts.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.doubts.grids import BETWEEN, grid_steps, grid_words
 from truearm.doubts.held_tool import TURN_MORE, held_tool, held_words
-from truearm.errors import Notice, count_of, list_outliers
+from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
+from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection
 from truearm.fits.details import ANOTHER_PLACE, VariableDetails
 from truearm.fits.identified import IdentifiedArm
@@ -21,12 +21,9 @@ from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.validation import FEW_HELD, Validation, mean_distance
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
+from truearm.outlier_fate import FULL_WEIGHT
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, to_si
-
-if TYPE_CHECKING:
-    from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
 
@@ -69,17 +66,14 @@ STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
-ROWS_EXCHANGED: Final = "rows_exchanged"
-TARGETS_EXCHANGED: Final = "targets_exchanged"
-EXCHANGED: Final = (ROWS_EXCHANGED, TARGETS_EXCHANGED)
 ORIENTATION_MISFIT: Final = "orientation_misfit"
-OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 CONSTANT_BETTER: Final = "constant_better"
 TOO_FEW_TO_TELL: Final = "too_few_to_tell"
 ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
 COMPUTED: Final = "computed"
+OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS, COMPUTED)
 ANOTHER_FRAME: Final = "another_frame"
 WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE, ANOTHER_FRAME)
 """What the measurements would fit, where a calibration does not help."""
@@ -96,97 +90,68 @@ CHECKS: Final = (
 )
 
 
-@dataclass(frozen=True)
-class Outliers:
-    """Rows that are far off.
-
-    Attributes:
-        named: Which they are, in words.
-        means_mm: Mean errors of the models on the judged rows without them; empty where none is judged.
-        judged: Which of them are judged, in words.
-        entries: Each with file, row and distance_mm.
-        means_mrad: As means_mm, of the orientation; empty where it was not fitted.
-        fate: What became of them in the fits, as fate_of_outliers has it.
-        exchanged: Whether some were found to be exchanged, which notices name.
-    """
-
-    named: str
-    means_mm: Mapping[str, float]
-    judged: str = ""
-    entries: Sequence[Mapping[str, Any]] = ()
-    means_mrad: Mapping[str, float] = field(default_factory=dict)
-    fate: str = ""
-    exchanged: bool = False
-
-    @classmethod
-    def of(cls, calibration: "Calibration") -> "Outliers":
-        """Those of the rows that a calibration was fitted to."""
-        rows = calibration.rows
-        if rows is None:
-            return cls("", {})
-        found = rows.outliers()
-        held = None if calibration.selection.distances else calibration.held
-        means = {} if held is None else held.means_without_mm(found)
-        turns = {} if held is None else held.turns_without_mrad(found)
-        judged = held.among(found, calibration.model_name) if held is not None and means else []
-        named, among = (list_outliers(each, rows.data.files) for each in (found, judged))
-        exchanged = any(notice.kind in EXCHANGED for notice in calibration.notices)
-        return cls(named, means, among, found, turns, fate_of_outliers(calibration), exchanged)
-
-
 def doubts(
     arm: IdentifiedArm,
     models: Mapping[str, ArmModel],
     validation: Validation,
     best: str,
     floor_mm: float,
-    outliers: Outliers | None = None,
+    outliers: Outliers = NO_OUTLIERS,
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used; noise would leave `floor_mm`."""
-    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
+    means = judged_means_mm(validation, outliers)
+    before, after = means[NOMINAL], means[best]
     if before < COMPUTED_MM:
-        return [_computed()]
+        return [_computed(outliers)]
     what = f"mean error on {validation.judged} rows"
     return [
         *(
-            _single_rows(before, after, best, what, outliers)
+            _single_rows(validation, best, what, outliers)
             or no_help(before, after, what, floor_mm, outliers, best=best)
         ),
-        *_turns_otherwise(validation, best),
+        *_turns_otherwise(validation, best, outliers),
         *_far_from_nominal(arm, [models[CONSTANT], models[best]]),
     ]
 
 
 def stated_too_large(
-    data: Measurements, validation: Validation, best: str, held: HeldRows | None
+    data: Measurements,
+    validation: Validation,
+    best: str,
+    held: HeldRows | None,
+    outliers: Outliers = NO_OUTLIERS,
 ) -> list[Notice]:
-    """A warning where held-out rows are far nearer than the noise that rows state lets them be.
+    """A warning where held-out rows, outliers left out, are far nearer than the noise that rows state lets
+    them be.
 
     Args:
         data: All rows.
         validation: Errors of the models.
         best: The model that is used.
         held: The held-out rows, of which each level of sigma is judged; None where distances were judged.
+        outliers: Rows that are far off, if any are known.
     """
     if data.sigma_m is None:
         return []
     stated = float(np.median(data.stated_sigma_m)) * MM_PER_METRE
-    left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=held is None)
+    left = judged_means_mm(validation, outliers)[best]
+    noise, apart = mean_distance(stated, distances=held is None), outliers.without
     if left > UNLIKELY * noise:
-        return [] if held is None else _level_too_large(held.sigmas_mm(data), held, best)
+        return [] if held is None else _level_too_large(held.sigmas_mm(data), held, best, outliers)
     text = (
         f"The column of sigma typically says {length_mm(stated, 3)}, which alone would leave a mean error "
-        f"of {length_mm(noise, 3)}; on {validation.judged} rows it is {length_mm(left, 3)}. So sigma is too "
-        "large, and errors of the arm are taken for noise. Correct it (sigma is in m, sigma_mm in mm), or "
-        "leave the column out."
+        f"of {length_mm(noise, 3)}; on {validation.judged} rows{apart} it is {length_mm(left, 3)}. So sigma "
+        "is too large, and errors of the arm are taken for noise. Correct it (sigma is in m, sigma_mm in "
+        "mm), or leave the column out."
     )
     return [Notice(STATED_TOO_LARGE, text)]
 
 
-def _level_too_large(sigmas_mm: Floats, held: HeldRows, best: str) -> list[Notice]:
+def _level_too_large(sigmas_mm: Floats, held: HeldRows, best: str, outliers: Outliers) -> list[Notice]:
     """The same of the largest sigma that enough held-out rows state (n,), if it is so."""
     errors = MM_PER_METRE * held.errors[best].distance_m
-    for level in reversed(_levels(np.where(np.isfinite(errors), sigmas_mm, 0.0))):
+    judged = np.isfinite(errors) & held.without(outliers.entries)
+    for level in reversed(_levels(np.where(judged, sigmas_mm, 0.0))):
         left, noise = float(errors[level].mean()), mean_distance(sigmas_mm[level].mean(), distances=False)
         if len(level) < FEWEST_OF_LEVEL or left > UNLIKELY * noise:
             continue
@@ -218,15 +183,8 @@ def constants_do_better(mean_mm: float, constant_mm: float) -> bool:
     return SAME * mean_mm > constant_mm
 
 
-def judged_means_mm(validation: Validation, outliers: Outliers | None) -> dict[str, float]:
-    """Mean errors of the models on the judged rows, without the outliers where these are known."""
-    if outliers is not None and outliers.means_mm:
-        return dict(outliers.means_mm)
-    return {name: found.position.mean for name, found in validation.holdout.items()}
-
-
 def constant_is_better(
-    validation: Validation, best: str, held: HeldRows | None, outliers: Outliers | None = None
+    validation: Validation, best: str, held: HeldRows | None, outliers: Outliers = NO_OUTLIERS
 ) -> list[Notice]:
     """A notice where what varies was learnt and the constants alone are surely nearer, outliers left out.
 
@@ -236,11 +194,11 @@ def constant_is_better(
     means = judged_means_mm(validation, outliers)
     if best in {NOMINAL, CONSTANT} or held is None or not helps(means[NOMINAL], means[best]):
         return []
-    ahead, error = held.lead_mm(CONSTANT, best, () if outliers is None else outliers.entries)
+    ahead, error = held.lead_mm(CONSTANT, best, outliers.entries)
     if not constants_do_better(means[best], means[CONSTANT]) or ahead <= SURE * error:
         return []
-    apart = ", outliers left out" if outliers is not None and outliers.means_mm else ""
-    robust = " --robust cauchy" if best == VARIABLE and outliers is not None and outliers.entries else ""
+    apart = ", outliers left out" if outliers.means_mm else ""
+    robust = " --robust cauchy" if best == VARIABLE and outliers.entries else ""
     against = f"a mean error of {length_mm(means[CONSTANT], 3)} against {length_mm(means[best], 3)}"
     if validation.n_holdout_poses < FEW_HELD:
         text = (
@@ -356,7 +314,7 @@ def no_help(
     after_mm: float,
     what: str,
     floor_mm: float,
-    outliers: Outliers | None = None,
+    outliers: Outliers = NO_OUTLIERS,
     *,
     best: str = VARIABLE,
 ) -> list[Notice]:
@@ -367,7 +325,7 @@ def no_help(
         after_mm: That of its own.
         what: What these are.
         floor_mm: What noise alone would leave on average.
-        outliers: Rows that are far off, if any are known.
+        outliers: Rows that are far off, if any are known; those that are judged take no part in the errors.
         best: Name of its own model.
     """
     if helps(before_mm, after_mm):
@@ -382,13 +340,16 @@ def no_help(
                 "Measure with a better instrument, each pose several times, or more poses."
             )
         text = (
-            f"{start}: the {what} is {length_mm(after_mm, 4)}, that of the nominal model "
-            f"{length_mm(before_mm, 4)} already. {why}"
+            f"{start}: the {what}{outliers.without} is {length_mm(after_mm, 4)}, that of the nominal "
+            f"model {length_mm(before_mm, 4)} already. {why}"
         )
+        if outliers.means_mm:
+            text += f" Correct the rows that are far off, or leave them out: {outliers.judged}."
         return [Notice(NO_GAIN, text)]
     text = (
-        f"The calibration does not help: its {what} is {length_mm(after_mm, 4)}, that of the nominal model "
-        f"{length_mm(before_mm, 4)}. Do not use it until the reason is found. {to_check(outliers)}"
+        f"The calibration does not help: its {what}{outliers.without} is {length_mm(after_mm, 4)}, that of "
+        f"the nominal model {length_mm(before_mm, 4)}. Do not use it until the reason is found. "
+        f"{to_check(outliers)}"
     )
     return [Notice(NO_HELP, text)]
 
@@ -403,14 +364,16 @@ def gains_nothing(best: str) -> tuple[str, str]:
     )
 
 
-def to_check(outliers: Outliers | None) -> str:
+def to_check(outliers: Outliers) -> str:
     """What to look at where a calibration does not help: first rows that are far off, if any are."""
-    if outliers is not None and outliers.exchanged:
+    if outliers.exchanged:
         return "Put right first what is exchanged, or leave it out, and calibrate again."
-    if outliers is None or not outliers.named:
-        return f"{CHECKS}."
+    return f"{CHECKS}." if not outliers.named else f"{_these_first(outliers)} {CHECKS}."
+
+
+def _these_first(outliers: Outliers) -> str:
     robust = ", and --robust cauchy gives hardly any weight" if outliers.fate == FULL_WEIGHT else ""
-    return f"Look at these rows first, which alone may spoil the fit{robust}: {outliers.named}. {CHECKS}."
+    return f"Look at these rows first, which alone may spoil the fit{robust}: {outliers.named}."
 
 
 def nothing_to_gain(before_mm: float, after_mm: float, floor_mm: float) -> bool:
@@ -426,11 +389,10 @@ def nothing_to_gain(before_mm: float, after_mm: float, floor_mm: float) -> bool:
     return max(errors) < NEAR_MM or (like_noise and max(errors) < NOISY_MM)
 
 
-def _single_rows(
-    before_mm: float, after_mm: float, best: str, what: str, outliers: Outliers | None
-) -> list[Notice]:
+def _single_rows(validation: Validation, best: str, what: str, outliers: Outliers) -> list[Notice]:
     """A warning where a calibration helps but for single rows that are far off."""
-    if outliers is None or helps(before_mm, after_mm) or not outliers.means_mm:
+    before_mm, after_mm = (validation.holdout[name].position.mean for name in (NOMINAL, best))
+    if helps(before_mm, after_mm) or not outliers.means_mm:
         return []
     without, nominally = outliers.means_mm[best], outliers.means_mm[NOMINAL]
     if not helps(nominally, without):
@@ -443,22 +405,34 @@ def _single_rows(
     return [Notice(SINGLE_ROWS, text)]
 
 
-def _computed() -> Notice:
+def _computed(outliers: Outliers) -> Notice:
+    apart = f" but for {outliers.judged}" if outliers.means_mm else ""
     text = (
-        f"The nominal arm has its target where these points are, within {COMPUTED_MM:g} mm: they seem to be "
-        "what a controller computes from its joints, not what was measured. Nothing can be learnt from them. "
-        "Give the points of an instrument that looks at the arm from outside."
+        f"The nominal arm has its target where these points are{apart}, within {COMPUTED_MM:g} mm: they seem "
+        "to be what a controller computes from its joints, not what was measured. Nothing can be learnt from "
+        "them. Give the points of an instrument that looks at the arm from outside."
     )
     return Notice(COMPUTED, text)
 
 
-def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
+def _turns_otherwise(validation: Validation, best: str, outliers: Outliers) -> list[Notice]:
+    """A warning where orientations do not fit, or all fit but those of single rows."""
     turned = validation.holdout[best].orientation
     if turned is None or turned.mean < LARGE_MRAD:
         return []
+    without = outliers.means_mrad.get(best, turned.mean)
+    if without < LARGE_MRAD:
+        text = (
+            f"Orientations of single rows are far off: {outliers.named}. With them their mean error on "
+            f"{validation.judged} rows is {turned.mean:.4g} mrad, without them {without:.4g} mrad. "
+            "Correct these rows or leave their orientations empty, and calibrate again."
+        )
+        return [Notice(SINGLE_ROWS, text)]
+    turned_most = max((entry.get("turn_mrad", 0.0) for entry in outliers.entries), default=0.0)
+    first = f"{_these_first(outliers)} " if turned_most > LARGE_MRAD else ""
     text = (
         f"Orientations do not fit the arm: their mean error on {validation.judged} rows is "
-        f"{turned.mean:.4g} mrad. "
+        f"{turned.mean:.4g} mrad. {first}"
         "Check how they were noted (order of the quaternion, convention of Euler angles, into which frame "
         "they turn), or calibrate with positions alone: --use position."
     )

@@ -40,7 +40,7 @@ class Scattering:
     Attributes:
         name: Name of the set-up.
         deviation: Standard deviation of a coordinate, over what the fit took for it.
-        mm: The same in mm.
+        mm: The same of a single shot, in mm.
         error: Relative standard error of both.
         stated_mm: What half of the rows state as their sigma, or less.
     """
@@ -103,9 +103,12 @@ def _scattering(fitted: FittedRows, seen: Whitened, name: str, own: Mask) -> Sca
     held = seen.held[own]
     kept = np.maximum(seen.kept[own][held], LEAST_KEPT)
     deviation = float(np.median(np.abs(seen.left[own][held]) / np.sqrt(kept))) / QUARTILE
-    taken_for = np.sqrt(np.square(np.linalg.inv(seen.root[own])).sum(axis=2)[held])
+    of_visit = float(np.median(np.square(np.linalg.inv(seen.root[own])).sum(axis=2)[held]))
+    shots, single = (float(np.median(each[own][held])) for each in (seen.shots, seen.single))
+    # What the mean of its shots scatters beyond what was expected, each of them has of its own.
+    square = max(single + shots * (deviation**2 - 1.0) * of_visit, deviation**2 * of_visit)
     error = ERROR_OF_MEDIAN / np.sqrt(AXES * len(held))
     data = fitted.data.select(seen.rows[own])
     stated = float(np.median(data.stated_sigma_m))
-    mm = MM_PER_METRE * deviation * float(np.median(taken_for))
+    mm = MM_PER_METRE * float(np.sqrt(square))
     return Scattering(name, deviation, mm, float(error), MM_PER_METRE * stated)

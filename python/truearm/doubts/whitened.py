@@ -17,6 +17,7 @@ from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.measured_parts import held_parts
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
+from truearm.rows.shots import Scatter
 from truearm.rows.visits import means, visit_numbers
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,64 @@ FAINT: Final = 0.01
 
 
 @dataclass(frozen=True, eq=False)
+class Visits:
+    """Visits to poses, v of them, each with the mean of its shots.
+
+    Attributes:
+        rows: Place of the first row of each among the fitted rows (v,).
+        residual: Mean residual of its shots (v, m), m.
+        shots: How many of them hold it (v, m).
+        stated: Mean of the variances that they state (v,), m^2.
+        own: Variance that each shot has of its own beside, which those of a visit differ by, m^2.
+    """
+
+    rows: Rows
+    residual: Floats
+    shots: Floats
+    stated: Floats
+    own: float
+
+    @classmethod
+    def of(cls, fitted: FittedRows, selection: Selection, progress: Floats, trusted: Mask) -> "Visits":
+        """Those of `trusted` rows (n,), some where they are many, set-up after set-up."""
+        parts = held_parts(fitted.data, selection)[:, :-1]
+        _, group = np.unique(fitted.data.group, return_inverse=True)
+        order = np.lexsort((progress, group.reshape(-1)))
+        order = order[(trusted & parts.any(axis=1))[order]]
+        visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
+        held = np.repeat(parts, AXES, axis=1)[order]
+        each = fitted.residual[order, : held.shape[1]] * held
+        shots = means(held.astype(np.float64), visits) * np.bincount(visits)[:, None]
+        residual = means(each, visits) * np.bincount(visits)[:, None] / np.maximum(shots, 1.0)
+        sigma = fitted.data.sigma_m
+        own_sigma = np.zeros(len(order)) if sigma is None else np.nan_to_num(sigma[order])
+        stated, further = means(np.square(own_sigma), visits), np.bincount(visits) - 1.0
+        own = Scatter.of(np.where(held, each, np.nan), visits).own
+        own -= float(np.average(stated, weights=further)) if further.any() else 0.0
+        _, first = np.unique(visits, return_index=True)
+        some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
+        return cls(order[first[some]], residual[some], shots[some], stated[some], max(own, 0.0))
+
+    @property
+    def held(self) -> Mask:
+        """What was measured (v, m)."""
+        return np.asarray(self.shots > 0.0)
+
+    def noise(self, of_row: Floats) -> tuple[Floats, Floats]:
+        """Covariance (v, m, m) of the means of shots, ones where not measured, and the variance (v, m) of a
+        single shot, of that of a row `of_row` (v, m, m) beside what it states.
+
+        Shots share what the arm did not repeat and what no model holds.
+        """
+        unit = np.eye(self.shots.shape[1])
+        own = np.minimum(self.own, np.linalg.eigvalsh(of_row)[:, 0])[:, None]
+        differ = own + self.stated[:, None]
+        single = np.diagonal(of_row, axis1=1, axis2=2) + self.stated[:, None]
+        mean = of_row + (differ / np.maximum(self.shots, 1.0) - own)[:, :, None] * unit
+        return np.where(self.held[:, :, None] & self.held[:, None], mean, unit), single
+
+
+@dataclass(frozen=True, eq=False)
 class Whitened:
     """Residuals of v visits to poses, and what the fit has taken of them.
 
@@ -43,18 +102,20 @@ class Whitened:
         rows: Place of the first row of each visit among the fitted rows (v,), set-up after set-up, each in
             the order of measuring.
         left: z, of positions (v, m), three for each target; zero where not measured.
-        held: What was measured (v, m).
+        shots: How many shots of the visit hold it (v, m); zero where not measured.
         root: R^(-1/2) of each visit (v, m, m).
         taken: T (v m, v m).
         joints: Derivatives (v, m, N) by the joint values, base frame; zero where not measured.
+        single: Variance (v, m) of a single shot, m^2.
     """
 
     rows: Rows
     left: Floats
-    held: Mask
+    shots: Floats
     root: Floats
     taken: Floats
     joints: Floats
+    single: Floats
 
     @classmethod
     def of(cls, found: Calibration, fitted: FittedRows, progress: Floats) -> "Whitened":
@@ -65,20 +126,28 @@ class Whitened:
             fitted: Its rows, n of them.
             progress: When each was measured, from 0 for the first of its set-up to 1 for the last (n,).
         """
-        rows, residual, held = _visits(fitted, found.selection, progress)
+        # What varies is without its outliers; constants keep them, and are looked at by medians.
+        trusted = (fitted.weight >= TRUSTED) | (found.variable is None)
+        seen = Visits.of(fitted, found.selection, progress, trusted)
+        rows, held = seen.rows, seen.held
         data = fitted.fitted.select(rows)
         inputs, arm, setup, joints = _derivatives(found, data, held)
         size = held.shape[1]
-        noise = found.spread.noise(arm, np.zeros(size, dtype=np.bool_))
-        noise = noise + np.square(data.stated_sigma_m)[:, None, None] * np.eye(size)
-        noise = np.where(held[:, :, None] & held[:, None], noise, np.eye(size))
+        noise, single = seen.noise(found.spread.noise(arm, np.zeros(size, dtype=np.bool_)))
         root = np.linalg.cholesky(np.linalg.inv(noise)).transpose(0, 2, 1)
         known = found.spread.joint(inputs, arm, setup) / _widened(found) ** 2
         known = known.reshape(len(data), size, len(data), size)
-        known = np.einsum("iab,ibkc->iakc", root, known)
-        taken = np.einsum("iakc,kdc->iakd", known, root).reshape(held.size, held.size)
-        left = np.einsum("iab,ib->ia", root, residual)
-        return cls(rows, left, held, root, taken, joints)
+        # A fit takes as much less of a row as it gives it less weight.
+        counted = root * np.sqrt(fitted.weight[rows])[:, None, None]
+        known = np.einsum("iab,ibkc->iakc", counted, known)
+        taken = np.einsum("iakc,kdc->iakd", known, counted).reshape(held.size, held.size)
+        left = np.einsum("iab,ib->ia", root, seen.residual)
+        return cls(rows, left, seen.shots, root, taken, joints, single)
+
+    @property
+    def held(self) -> Mask:
+        """What was measured (v, m)."""
+        return np.asarray(self.shots > 0.0)
 
     @property
     def kept(self) -> Floats:
@@ -118,23 +187,6 @@ class Whitened:
 def _widened(found: Calibration) -> float:
     """Factor on standard deviations that is meant for where nothing was measured."""
     return 1.0 if found.variable is None else found.variable.hyper["extrapolation"][0]
-
-
-def _visits(fitted: FittedRows, selection: Selection, progress: Floats) -> tuple[Rows, Floats, Mask]:
-    """First rows (v,) of visits, the mean residual of each one's shots (v, m), and what they hold (v, m)."""
-    parts = held_parts(fitted.data, selection)[:, :-1]
-    _, group = np.unique(fitted.data.group, return_inverse=True)
-    order = np.lexsort((progress, group.reshape(-1)))
-    counts: Mask = np.asarray((fitted.weight >= TRUSTED) & parts.any(axis=1))
-    order = order[counts[order]]
-    visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
-    held = np.repeat(parts, AXES, axis=1)[order].astype(np.float64)
-    share = means(held, visits)
-    residual = means(fitted.residual[order, : held.shape[1]] * held, visits)
-    residual = np.divide(residual, share, out=np.zeros_like(residual), where=share > 0.0)
-    _, first = np.unique(visits, return_index=True)
-    some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
-    return order[first[some]], residual[some], share[some] > 0.0
 
 
 def _derivatives(found: Calibration, data: Measurements, held: Mask) -> tuple[Floats, Floats, Floats, Floats]:

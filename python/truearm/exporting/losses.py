@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.description.robot_data import RobotData
-from truearm.doubts.of_results import Outliers
+from truearm.doubts.outliers import Outliers
 from truearm.errors import list_rows
 from truearm.fits.models import CONSTANT
 from truearm.fits.parameters import BETA

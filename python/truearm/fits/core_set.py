@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Use = Literal["position", "pose", "targets"]
 
+POSITION: Final = "position"
+DISTANCE: Final = "distance"
 USES: Final = get_args(Use)
 
 
@@ -37,6 +39,11 @@ class Selection:
     orientation: bool = False
     distances: bool = False
     judge: int = 0
+
+    @property
+    def errors_of(self) -> str:
+        """What errors in mm are of: "position", whose lengths they are, or "distance"."""
+        return DISTANCE if self.distances else POSITION
 
     @property
     def judges_another(self) -> bool:

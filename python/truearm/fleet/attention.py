@@ -7,7 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.doubts.of_results import helps, nothing_to_gain
-from truearm.fleet.fleet_file import LimitsSection
+from truearm.fits.core_set import DISTANCE, POSITION
+from truearm.fleet.fleet_file import LimitsSection, limit_key
 
 Row = Mapping[str, Any]
 
@@ -15,6 +16,8 @@ GOOD: Final = "good"
 ATTENTION: Final = "attention"
 FAILED: Final = "failed"
 MOST_MOVED_NAMED: Final = 3
+STATISTICS: Final = {"mean": "Mean", "max": "Largest"}
+ALIKE: Final = ("robot", "model", "errors_of")
 PEERS: Final = 4
 """Arms of one kind that make a median to stand out from."""
 STANDS_OUT: Final = 2.0
@@ -32,8 +35,8 @@ class Reason:
     """Why an arm needs attention.
 
     Attributes:
-        kind: One word for programs: "failed", "no_gain", "doubt", "drift", "mean", "max", "worse",
-            "stands_out", "outliers" or "intervals".
+        kind: One word for programs: "failed", "no_gain", "doubt", "drift", "mean", "max", "unjudged",
+            "worse", "stands_out", "outliers" or "intervals".
         words: The sentence for people.
         weight: How far beyond its limit; those of one kind are sorted by it.
     """
@@ -50,6 +53,7 @@ KINDS: Final = (
     "drift",
     "mean",
     "max",
+    "unjudged",
     "worse",
     "stands_out",
     "outliers",
@@ -73,6 +77,7 @@ def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reaso
         *_doubted(arm),
         *_drifted(arm, limits),
         *_beyond(arm, limits),
+        *_unjudged(arm, limits),
         *_stands_out(arm, fleet),
     ]
     found += [*_worse(arm, limits), *_outliers(arm), *_intervals(arm)]
@@ -93,12 +98,17 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 
 
 def _no_gain(arm: Row) -> Iterator[Reason]:
-    before, after = arm["nominal_mean_mm"], arm["mean_mm"]
+    before, after = _mean_mm(arm, "nominal_"), _mean_mm(arm)
     if not helps(before, after):
         none = nothing_to_gain(before, after, arm["floor_mm"])
         said = "There is nothing to gain" if none else "The calibration does not help"
         words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)
+
+
+def _mean_mm(arm: Row, model: str = "") -> float:
+    """Mean error on held-out rows, outliers left out where these are known."""
+    return float(arm.get(f"{model}without_outliers_mm", arm[f"{model}mean_mm"]))
 
 
 def _doubted(arm: Row) -> Iterator[Reason]:
@@ -131,19 +141,44 @@ def _change(entry: Row) -> str:
 
 
 def _beyond(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
-    for kind, limit, noun in (("mean", limits.mean_mm, "Mean"), ("max", limits.max_mm, "Largest")):
-        value = arm[f"{kind}_mm"]
+    for kind, noun in STATISTICS.items():
+        value, limit = arm[f"{kind}_mm"], limits.of(kind, arm["errors_of"])
         if limit is not None and value > limit:
-            words = f"{noun} error {_above(value, limit)} mm on held-out rows, beyond {limit:g} mm."
+            words = f"{noun} {_error(arm)} {_above(value, limit)} mm on held-out rows, beyond {limit:g} mm."
             yield Reason(kind, words, value / limit)
 
 
+def _unjudged(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
+    """Limits of position errors where distances were measured, which see one coordinate of them."""
+    if arm["errors_of"] != DISTANCE:
+        return
+    stated = [name for name in STATISTICS if limits.of(name, POSITION) is not None]
+    open_ones = [name for name in stated if limits.of(name, DISTANCE) is None]
+    if open_ones:
+        keys, own = (" and ".join(limit_key(name, of) for name in open_ones) for of in (POSITION, DISTANCE))
+        words = (
+            f"Position errors, which {keys} would limit, were not measured: distances were, whose errors are "
+            f"smaller. State {own} too, or measure points."
+        )
+        yield Reason("unjudged", words)
+
+
+def _error(arm: Row) -> str:
+    """What the errors of an arm are called."""
+    return "distance error" if arm["errors_of"] == DISTANCE else "error"
+
+
 def _worse(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
-    """Against the last calibration; where a limit of the mean is stated, that says what matters."""
-    was = (arm["drift"] or {}).get("previous_mean_mm")
-    if was is not None and limits.mean_mm is None and arm["mean_mm"] > WORSE * was:
-        words = f"Mean error {arm['mean_mm']:.3f} mm on held-out rows: it was {was:.3f} mm."
-        yield Reason("worse", words, arm["mean_mm"] / was)
+    """Against the last calibration, if its errors were of the same kind; where a limit of the mean is stated,
+    that says what matters.
+    """
+    drift = arm["drift"] or {}
+    was = drift.get("previous_mean_mm")
+    if was is None or drift["previous_errors_of"] != arm["errors_of"]:
+        return
+    if limits.of("mean", arm["errors_of"]) is None and (mean := _mean_mm(arm)) > WORSE * was:
+        words = f"Mean {_error(arm)} {mean:.3f} mm on held-out rows: it was {was:.3f} mm."
+        yield Reason("worse", words, mean / was)
 
 
 def _above(value: float, limit: float) -> str:
@@ -153,17 +188,18 @@ def _above(value: float, limit: float) -> str:
 
 
 def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:
-    """Against the arms of its kind that were calibrated in the same way."""
+    """Against the arms of its kind that were calibrated and judged in the same way."""
     alike = [
-        other["mean_mm"]
+        _mean_mm(other)
         for other in fleet
-        if other["status"] != FAILED and (other["robot"], other["model"]) == (arm["robot"], arm["model"])
+        if other["status"] != FAILED and all(other[key] == arm[key] for key in ALIKE)
     ]
     if len(alike) < PEERS:
         return
-    ratio = arm["mean_mm"] / float(np.median(alike))
+    ratio = _mean_mm(arm) / float(np.median(alike))
     if ratio > STANDS_OUT:
-        words = f"Mean error {ratio:.1f} times the median of the fleet's {len(alike)} {arm['robot']} arms."
+        of = f"the fleet's {len(alike)} {arm['robot']} arms"
+        words = f"Mean {_error(arm)} {ratio:.1f} times the median of {of}."
         yield Reason("stands_out", words, ratio)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.doubts.nominal_misfit import some_rows
+from truearm.doubts.outliers import known_mean_mm
 from truearm.errors import InputError, WorkError
 from truearm.fits.identified import Frame
 from truearm.fits.models import CONSTANT
@@ -75,14 +76,9 @@ def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dic
         "std_mm": None if uncertain_m is None else float(np.median(uncertain_m) * MM_PER_METRE),
         "share_beyond": None if uncertain_m is None else float(np.mean(change_m[some] > SURE * uncertain_m)),
         "moved": list(_moved(previous, now)),
-        "previous_mean_mm": _held_out_mm(previous),
+        "previous_mean_mm": known_mean_mm(previous),
+        "previous_errors_of": previous.selection.errors_of,
     }
-
-
-def _held_out_mm(calibration: Calibration) -> float | None:
-    """Mean error on held-out rows, mm; None where none was held out."""
-    known = calibration.validation.holdout.get(calibration.model_name)
-    return None if known is None else float(known.position.mean)
 
 
 def _features(calibration: Calibration, data: Measurements) -> dict[str, Floats] | None:

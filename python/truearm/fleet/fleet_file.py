@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed, read_text
+from truearm.fits.core_set import DISTANCE
 from truearm.fits.options import Options
 from truearm.fleet.keys import in_keys
 
@@ -78,7 +79,19 @@ class LimitsSection(Section):
 
     mean_mm: Positive | None = None
     max_mm: Positive | None = None
+    distance_mean_mm: Positive | None = None
+    distance_max_mm: Positive | None = None
     drift_mm: Positive | None = None
+
+    def of(self, statistic: str, errors_of: str) -> float | None:
+        """The limit of the "mean" or "max" of errors of "position" or "distance", mm; None without one."""
+        limit: float | None = getattr(self, limit_key(statistic, errors_of))
+        return limit
+
+
+def limit_key(statistic: str, errors_of: str) -> str:
+    """The key of a limit of errors."""
+    return f"{'distance_' if errors_of == DISTANCE else ''}{statistic}_mm"
 
 
 class FleetFile(Section):

@@ -6,6 +6,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from truearm.errors import count_of
+from truearm.fits.core_set import DISTANCE
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD
 from truearm.fleet.drift import SURE
 from truearm.fleet.fleet_file import Fleet
@@ -22,6 +23,7 @@ COLUMNS: Final = (
     "verdict",
     "robot",
     "held-out rows",
+    "errors of",
     "mean, mm",
     "max, mm",
     "nominal mean, mm",
@@ -29,7 +31,9 @@ COLUMNS: Final = (
     "drift max, mm",
     "why",
 )
-LEFT: Final = (0, 1, 2, 9)
+LEFT: Final = (0, 1, 2, 4, 10)
+MARKS: Final = (("nominal", "nominal", "nominal_mean_mm"), ("variable", "calibrated", "mean_mm"))
+"""Models, what they are called, and their errors in rows."""
 SMALLEST: Final = 1e-4
 """In mm: smaller errors are drawn there."""
 AROUND: Final = 1.3
@@ -99,8 +103,9 @@ def _table(arms: Sequence[Judged], reports: Collection[str]) -> Table:
         "Arms, those that need attention first",
         COLUMNS,
         [_cells(arm, reports) for arm in arms],
-        says="Errors are those of held-out rows. Drift is how far predicted positions "
-        "moved since the last calibration, over the poses of the data.",
+        says="Errors are those of held-out rows. Those of distances, one coordinate of where the point is, "
+        "are smaller than those of positions would be. Drift is how far predicted positions moved since the "
+        "last calibration, over the poses of the data.",
         left=LEFT,
     )
 
@@ -116,6 +121,7 @@ def _cells(arm: Judged, reports: Collection[str]) -> list[str | Cell]:
         Cell(arm.verdict, TONES[arm.verdict]),
         row.get("robot", ""),
         str(row.get("held_out", "")),
+        row.get("errors_of", ""),
         *("" if value is None else f"{value:.3f}" for value in numbers),
         " ".join(reason.words for reason in arm.reasons),
     ]
@@ -135,31 +141,47 @@ def _notices(arms: Sequence[Judged]) -> list[Table]:
 def _errors(arms: Sequence[Judged]) -> Figure | None:
     if not arms:
         return None
-    names = [arm.row["arm"] for arm in arms]
-    marks = [("nominal", "nominal", "nominal_mean_mm"), ("variable", "calibrated", "mean_mm")]
+    kinds = {
+        of: [arm for arm in arms if arm.row["errors_of"] == of]
+        for of in dict.fromkeys(arm.row["errors_of"] for arm in arms)
+    }
     traces = [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": label,
-            "x": names,
-            "y": [max(float(arm.row[key]), SMALLEST) for arm in arms],
-            "marker": {"color": f"@{model}", "symbol": marker_of(model), "size": 10},
-        }
-        for model, label, key in marks
+        _mean_errors(of if len(kinds) > 1 else "", alike, mark)
+        for of, alike in kinds.items()
+        for mark in MARKS
     ]
-    worst = max(arms, key=lambda arm: float(arm.row["mean_mm"]))
-    shown = [max(float(arm.row[key]), SMALLEST) for _, _, key in marks for arm in arms]
+    worst = {of: max(alike, key=lambda arm: float(arm.row["mean_mm"])).row for of, alike in kinds.items()}
+    shown = [y for trace in traces for y in trace["y"]]
     error = log_axis("mean error, mm (logarithmic)", min(shown) / AROUND, max(shown) * AROUND)
-    layout = {"xaxis": _names(names), "yaxis": error}
+    layout = {"xaxis": _names([arm.row["arm"] for arm in arms]), "yaxis": error}
     return Figure(
         "Mean held-out error of each arm",
-        f"The largest is that of {worst.row['arm']}: {worst.row['mean_mm']:.3f} mm.",
+        " ".join(
+            f"The largest {of} error is that of {row['arm']}: {row['mean_mm']:.3f} mm."
+            for of, row in worst.items()
+        ),
         traces,
         {**layout, **legend()},
         height=HEIGHT,
         is_wide=True,
     )
+
+
+def _mean_errors(of: str, arms: Sequence[Judged], mark: tuple[str, str, str]) -> dict[str, Any]:
+    """Mean errors of arms; `of` says what of where some are of positions and others of distances."""
+    model, label, key = mark
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": f"{label}, {of}" if of else label,
+        "x": [arm.row["arm"] for arm in arms],
+        "y": [max(float(arm.row[key]), SMALLEST) for arm in arms],
+        "marker": {
+            "color": f"@{model}",
+            "symbol": marker_of(model) + ("-open" if of == DISTANCE else ""),
+            "size": 10,
+        },
+    }
 
 
 def _drift(arms: Sequence[Judged]) -> Figure | None:

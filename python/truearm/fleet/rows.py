@@ -21,6 +21,7 @@ CSV_COLUMNS: Final = (
     "model",
     "rows",
     "held_out",
+    "errors_of",
     "mean_mm",
     "p95_mm",
     "max_mm",
@@ -63,9 +64,9 @@ class Judged:
         if row["status"] == FAILED:
             return "It could not be calibrated."
         return (
-            f"On {row['held_out']} held-out rows the mean error is {row['mean_mm']:.3f} mm and the largest "
-            f"{row['max_mm']:.3f} mm; with the nominal model they are {row['nominal_mean_mm']:.3f} mm and "
-            f"{row['nominal_max_mm']:.3f} mm."
+            f"On {row['held_out']} held-out rows the mean {row['errors_of']} error is "
+            f"{row['mean_mm']:.3f} mm and the largest {row['max_mm']:.3f} mm; with the nominal model they "
+            f"are {row['nominal_mean_mm']:.3f} mm and {row['nominal_max_mm']:.3f} mm."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -85,9 +86,12 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "model": made.model,
         "rows": summary["n_train"] + summary["n_holdout"],
         "held_out": summary["n_holdout"],
+        "errors_of": made.errors_of,
         **{key: errors[key] for key in ("mean_mm", "p95_mm", "max_mm")},
         "nominal_mean_mm": before["mean_mm"],
         "nominal_max_mm": before["max_mm"],
+        "without_outliers_mm": made.means_mm[made.model],
+        "nominal_without_outliers_mm": made.means_mm[NOMINAL],
         "noise_mm": summary["noise_mm"],
         "floor_mm": made.floor_mm,
         "coverage_95": summary["coverage_95"],

@@ -6,6 +6,7 @@ from typing import Any
 
 from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
+from truearm.doubts.outliers import Outliers, judged_means_mm
 from truearm.doubts.points_together import points_together
 from truearm.fits.options import Options
 from truearm.fleet.doubted import grave_notices
@@ -47,7 +48,9 @@ class ArmMade:
         calibration: Bytes of the calibration file.
         summary: Content of summary.json.
         model: Name of the model that predicts.
-        floor_mm: Mean position error that noise alone would leave.
+        means_mm: Mean errors of the models on held-out rows, without outliers where these are known.
+        floor_mm: Mean error that noise alone would leave.
+        errors_of: What errors in mm are of: "position" or "distance".
         drift: What changed since the last calibration; None where there is none.
         grave: The notices that need attention.
         files: The files of its measurements.
@@ -57,7 +60,9 @@ class ArmMade:
     calibration: bytes
     summary: dict[str, Any]
     model: str
+    means_mm: dict[str, float]
     floor_mm: float
+    errors_of: str
     drift: dict[str, Any] | None
     grave: list[str]
     files: list[str]
@@ -81,7 +86,9 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         calibration=made.to_bytes(with_rows=not task.strip),
         summary=made.summary,
         model=made.model_name,
+        means_mm=judged_means_mm(made.validation, Outliers.of(made)),
         floor_mm=distance_at_floor_mm(made),
+        errors_of=made.selection.errors_of,
         drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
         files=task.data.files,

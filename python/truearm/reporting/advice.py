@@ -10,7 +10,6 @@ from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.of_results import (
     CONSTANT_BETTER,
-    EXCHANGED,
     FEW_VALUES,
     HELD_TOOL,
     HIDING,
@@ -20,6 +19,7 @@ from truearm.doubts.of_results import (
     WOULD_FIT,
     to_check,
 )
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
@@ -92,7 +92,7 @@ def _refused(facts: Facts) -> Iterator[Advice]:
 def _checks(facts: Facts) -> Iterator[Advice]:
     if any(_exchanged(facts)):
         return
-    words = to_check(None if any(_would_fit(facts)) else facts.outliers)
+    words = to_check(NO_OUTLIERS if any(_would_fit(facts)) else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
 
 
@@ -219,7 +219,9 @@ def _joints_moved(facts: Facts) -> Iterator[Advice]:
 
 def _uneven_setups(facts: Facts) -> Iterator[Advice]:
     if words := facts.noticed(UNEVEN_SETUPS):
-        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, 2.0 * facts.mean_mm())
+        # Outliers come first: without them there may be less to state.
+        weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
+        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, weight)
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:

@@ -12,7 +12,8 @@ from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.description.one_turn import one_turn
 from truearm.doubts.grids import grid_steps, grid_words
-from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, Outliers, helps, nothing_to_gain
+from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
+from truearm.doubts.outliers import NO_OUTLIERS, Outliers
 from truearm.evaluation import Evaluation
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.fits.stillness import still_warning
@@ -79,7 +80,7 @@ class Facts:
     @property
     def error(self) -> str:
         """What errors are of: "distance error" or "position error"."""
-        return "distance error" if self.calibration.selection.distances else "position error"
+        return f"{self.calibration.selection.errors_of} error"
 
     @property
     def point_name(self) -> str:
@@ -133,7 +134,7 @@ class Facts:
     @cached_property
     def outliers(self) -> Outliers:
         """Rows that are far off; none after an update, which leaves its own out."""
-        return Outliers("", {}) if self.update is not None else Outliers.of(self.calibration)
+        return NO_OUTLIERS if self.update is not None else Outliers.of(self.calibration)
 
     @property
     def is_spoilt_by_rows(self) -> bool:
@@ -143,10 +144,13 @@ class Facts:
     @property
     def is_of_no_help(self) -> bool:
         """Whether the calibration is wrong, so that nothing it says of noise or of the arm holds."""
-        errors = self.calibration.validation.holdout
-        before, after = (errors[name].position.mean for name in (NOMINAL, self.best))
-        none = nothing_to_gain(before, after, self.floor_mm)
-        return not (helps(before, after) or none or self.is_spoilt_by_rows)
+        before, after = self.mean_mm(NOMINAL), self.mean_mm()
+        return not (helps(before, after) or self.gains_nothing or self.is_spoilt_by_rows)
+
+    @property
+    def gains_nothing(self) -> bool:
+        """Whether it leaves no less than the nominal model, of data that are hardly wrong."""
+        return nothing_to_gain(self.mean_mm(NOMINAL), self.mean_mm(), self.floor_mm)
 
     @cached_property
     def floor_mm(self) -> float:

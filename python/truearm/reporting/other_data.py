@@ -50,8 +50,8 @@ def other_data(facts: Facts) -> Section:
     errors = found.errors
     rows = [[name, *(fixed(getattr(e.position, key)) for key in STATISTICS)] for name, e in errors.items()]
     now = errors[facts.best].position.mean
-    held = facts.calibration.validation.holdout[facts.best].position.mean
-    here, there = short(now, held)
+    here, there = short(now, facts.mean_mm())
+    apart = facts.outliers.without
     verb = "was" if len(found.finds) == 1 else "were"
     how = (
         f"{' and '.join(found.finds).capitalize()} {verb} found from others, {found.rows_of_frame}"
@@ -64,7 +64,7 @@ def other_data(facts: Facts) -> Section:
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "
-        f"{facts.judged} poses of its own data.{no_help}",
+        f"{facts.judged} poses of its own data{apart}.{no_help}",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]

@@ -149,13 +149,12 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     """How far repeated measurements lie from their centres."""
     distances = found.distances_mm()
     mean, spread = float(distances.mean()), float(distances.std(ddof=1)) if len(distances) > 1 else 0.0
-    error = facts.calibration.validation.holdout[facts.best].position.mean
     free = float((distances * found.widened()).mean())
     texts = short(mean, mean + 3.0 * spread, free)
     times = (
         " The mean of few measurements is drawn towards them: from the mean of many they would lie "
-        f"{texts[2]} mm on average. The mean error on {facts.judged} poses is "
-        f"{error / free:.1f} times that."
+        f"{texts[2]} mm on average. The {facts.mean_error} on {facts.judged} poses is "
+        f"{facts.mean_mm() / free:.1f} times that."
         if free > 0.0
         else ""
     )

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts.of_results import NEAR_MM, gains_nothing, helps, nothing_to_gain
+from truearm.doubts.of_results import NEAR_MM, gains_nothing, helps
 from truearm.errors import count_of
 from truearm.fits.models import NOMINAL, leaves_noise
 from truearm.judgement.validation import HEADINGS, STATISTICS, Statistics
@@ -66,8 +66,8 @@ def verdict(facts: Facts) -> str:
     )
     if facts.is_spoilt_by_rows:
         return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
-    if nothing_to_gain(nominal.mean, after.mean, facts.floor_mm):
-        if nominal.mean >= NEAR_MM and not leaves_noise(facts.best):
+    if facts.gains_nothing:
+        if facts.mean_mm(NOMINAL) >= NEAR_MM and not leaves_noise(facts.best):
             start, why = gains_nothing(facts.best)
             return f"{said} {start}. {why}"
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
@@ -97,9 +97,8 @@ def _former(facts: Facts) -> str:
 
 def tone(facts: Facts) -> Tone:
     """How good that is."""
-    validation = facts.calibration.validation
-    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, facts.best))
-    if not helps(before, after):
+    before, after = facts.mean_mm(NOMINAL), facts.mean_mm()
+    if facts.is_spoilt_by_rows or not helps(before, after):
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"

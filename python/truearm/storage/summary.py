@@ -75,8 +75,14 @@ def noise_mm(calibration: "Calibration") -> float:
 
 
 def _held_out_mm(calibration: "Calibration") -> float:
-    """Root mean square of a coordinate's error on held-out rows, without what rows state as their sigma."""
+    """Root mean square of a coordinate's error on held-out rows, without outliers, where these are known, and
+    without what rows state as their sigma.
+    """
     square = calibration.validation.holdout[calibration.model_name].position.rms ** 2 / AXES
+    if calibration.held is not None and calibration.rows is not None:
+        errors = MM_PER_METRE * calibration.held.errors[calibration.model_name].distance_m
+        kept = errors[calibration.held.without(calibration.rows.outliers())]
+        square = float(np.nanmean(np.square(kept if np.isfinite(kept).any() else errors))) / AXES
     stated = float(np.mean(np.square(stated_sigma_mm(calibration))))
     return math.sqrt(max(square - stated, 0.0))
 

@@ -25,6 +25,12 @@ REPEAT: Final = "repeat"
 PURPOSES: Final = ("train", VALIDATE, REPEAT)
 APPROACH: Final = "approach"
 """Column: from which side all joints came, 1 from lower readings, -1 from higher, 0 from anywhere."""
+POSE: Final = "pose"
+"""Column: number of the pose in the list that was measured."""
+READINGS: Final = "readings"
+"""Column: how many readings the measurement is the mean of."""
+OF_MEASURING: Final = (PURPOSE, APPROACH, POSE, READINGS)
+"""Columns that tell how a row was measured: no program meets such a value."""
 ONE_UNIT: Final = "Convert them to one unit, and end all names in it"
 OF_A_LENGTH: Final = (
     f"{ONE_UNIT}; if one is of a prismatic joint, end its name in _m or _mm, or say which joints there are "
