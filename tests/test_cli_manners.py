@@ -380,7 +380,7 @@ def test_results_fit_80_columns_and_name_the_next_command(measured, capsys):
 
 
 def test_long_numbers_are_wrapped(capsys):
-    many = {name: 123456.7 for name in ("nominal", "constant", "variable")}
+    many = dict.fromkeys(("nominal", "constant", "variable"), 123456.7)
     _print_scheme(cast("ta.Calibration", SimpleNamespace(scheme=None)), many)
     far = SimpleNamespace(position=lambda _q: np.full(3, 12345.6789123), limits=np.zeros((6, 2)))
     _print_verdict(cast("ta.Robot", far), [])

@@ -346,6 +346,16 @@ def test_a_wave_is_found_and_a_line_is_none():
     assert strongest_wave(x, np.exp(-x / 100.0)) is None
 
 
+@pytest.mark.parametrize("model", ["regions", "fcmac", "cmac"])
+def test_a_scheme_is_not_said_to_vary_along_joints_that_it_does_not_divide(reports, model):
+    words = words_of(reports[model].html)
+    assert f"The {model} model does not vary along joint 4 or joint 5." in words
+    assert "Variation along joint 3" in words
+    assert "Variation along joint 4" not in words
+    assert "varies by 0.0000" not in words
+    assert "an amplitude of 0.0000" not in words
+
+
 def test_slices_are_deviations_from_their_means(reports):
     figures = figures_of(reports["variable"].html)["figures"]
     titles = [title for title, _ in reports["variable"].figures]
@@ -390,7 +400,9 @@ def test_where_no_pose_was_planned_to_validate_the_options_do_not_say_that_some_
     table = arm.measure_table(arm.poses(60))
     table["purpose"] = np.where(table.index % 3 == 0, "validate", "train")
     found = report(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant"))
-    assert f"{planned} yes" in words_of(found.html)
+    assert f"{planned} yes, 20 rows" in words_of(found.html)
+    assert "share of the rows held out not drawn" in words_of(found.html)
+    assert "share of the rows held out 0.3" in words_of(reports["constant"].html)
 
 
 def test_every_option_has_words():

@@ -146,8 +146,8 @@ def _check_far_readings(measurements: Measurements, robot: Robot) -> None:
     raise InputError(
         f"joint {joint + 1} reads up to {value:.4g} {unit} in {measurements.row_names(far[:, joint])}",
         where=", ".join(measurements.files),
-        rule=f"No joint goes beyond {most[joint]:g} {unit}: the robot may have written such a number where it "
-        "knew none",
+        rule=f"No joint goes beyond {most[joint]:g} {unit}: such a number may have been written where the "
+        "robot knew none",
         way_out="Leave these rows out",
     )
 
