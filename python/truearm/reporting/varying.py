@@ -41,9 +41,11 @@ def varying(facts: Facts) -> Section:
         words += " Bands are two standard deviations of that deviation to either side."
     flat = without_effect(facts, effects)
     if flat:
-        names = swept_names(facts)
-        words += f" The {facts.best} model does not vary along {listed([names[k] for k in flat], last='or')}."
-    parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
+        names = [name for k, name in enumerate(swept_names(facts)) if k in flat]
+        where = "any joint" if len(flat) == len(effects) else listed(names, last="or")
+        words += f" The {facts.best} model does not vary along {where}."
+    parts: list[Part] = [Text(words, is_note=True)]
+    parts += [influence(facts, effects)] if len(flat) < len(effects) else []
     tree = region_tree(facts)
     parts += [tree] if tree is not None else []
     parts += [along(facts, which, effects[which]) for which in range(len(effects)) if which not in flat]
