@@ -5,6 +5,8 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,10 @@ from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from truearm.cli import main
+from truearm.errors import UsageError
 from truearm.exporting import constant_robot
+from truearm.framing import write_frame
+from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.inverse import Inverse
 from truearm.programs.frames import Frames
 from truearm.simulation import VirtualArm
@@ -231,3 +236,10 @@ def test_a_frames_file_that_is_none_stays_as_it_is(capsys):
     assert main(["frame", "arm.calib", *words]) == 1
     assert '"tool.a.xyz' in capsys.readouterr().err
     assert Path("cell.toml").read_text() == "[tool.a]\nxyz = [1, 2]\n"
+
+
+def test_a_frame_without_a_name_is_not_written(tmp_path):
+    found = cast(IdentifiedFrame, SimpleNamespace(kind="object"))
+    with pytest.raises(UsageError, match="Programs call it by a name"):
+        write_frame(tmp_path / "frames.toml", " ", found, "")
+    assert not (tmp_path / "frames.toml").exists()

@@ -11,15 +11,20 @@ import time
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
+import numpy as np
 import pytest
 
+import truearm as ta
 from truearm.cli import COMMANDS, console, main
 from truearm.cli.arguments import choices_of
+from truearm.cli.calibrate import _print_scheme
 from truearm.cli.display import DISPLAY, Counted, Expected, in_words
 from truearm.cli.durations import Took, place, remember, remembered
 from truearm.cli.lazy import LazyCommand
 from truearm.cli.progress import told_progress, told_stages
+from truearm.cli.robot_tables import _print_verdict
 from truearm.description.library import library_names
 from truearm.errors import Notice
 from truearm.programs.languages import language_of
@@ -372,3 +377,11 @@ def test_results_fit_80_columns_and_name_the_next_command(measured, capsys):
         assert following in printed, words
         assert max(map(len, printed.splitlines())) <= console.WIDTH, words
         assert "\x1b" not in printed, "no colours where stdout is no terminal"
+
+
+def test_long_numbers_are_wrapped(capsys):
+    many = dict.fromkeys(("nominal", "constant", "variable"), 123456.7)
+    _print_scheme(cast("ta.Calibration", SimpleNamespace(scheme=None)), many)
+    far = SimpleNamespace(position=lambda _q: np.full(3, 12345.6789123), limits=np.zeros((6, 2)))
+    _print_verdict(cast("ta.Robot", far), [])
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= console.WIDTH

@@ -112,6 +112,8 @@ def test_measurements_that_are_not_met_are_the_first_advice(folder, tmp_path, ca
     [
         (["report", "none.calib"], 1, "none.calib: there is no such file"),
         (["report", "later.csv"], 1, "no calibration"),
+        (["report", "."], 1, "Error: .: this is a directory. A calibration is a file"),
+        (["report", "/"], 1, "Error: /: this is a directory"),
         (["report", "arm.calib", "-o", "report.docx"], 2, "A report is a page (.html) or a PDF (.pdf)"),
         (["report", "arm.calib", "-o", "nowhere/report.html"], 1, "there is no such directory"),
         (["report", "arm.calib", "missing.csv"], 1, "missing.csv: there is no such file"),

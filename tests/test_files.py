@@ -10,7 +10,15 @@ import pytest
 
 from truearm.cli import main
 from truearm.errors import InputError
-from truearm.files import check_place, followed, make_directory, read_bytes, write_all, write_whole
+from truearm.files import (
+    check_output,
+    check_place,
+    followed,
+    make_directory,
+    read_bytes,
+    write_all,
+    write_whole,
+)
 
 
 def test_a_link_stays_one_and_what_it_leads_to_is_written(tmp_path):
@@ -137,6 +145,38 @@ def test_a_directory_is_made_with_those_above_it_and_no_file_is_one(tmp_path):
     (tmp_path / "file").write_text("a file")
     with pytest.raises(InputError, match=r"file: a file is in the way\. A directory is needed"):
         make_directory(tmp_path / "file")
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no file system that takes nothing")
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        (["calibrate", "rv-m2", "m.csv", "-o"], "/proc/none/x"),
+        (["fleet", "fleet.toml", "-o"], "/proc/none/x"),
+        (["report", "a.calib", "-o"], "/proc/a.html"),
+        (["strip", "a.calib", "-o"], "/proc/a.calib"),
+    ],
+)
+def test_where_nothing_can_be_made_though_it_may_is_told_before_the_work(
+    words, place, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fleet.toml").write_text("arm = [{name = 'R1', robot = 'ur10', measurements = 'm.csv'}]")
+    assert main([*words, place]) == 1
+    assert "Error: /proc: nothing can be written here" in capsys.readouterr().err
+
+
+def test_to_try_whether_a_directory_takes_files_leaves_nothing(tmp_path):
+    check_output(tmp_path / "a.html")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words", [["calibrate", "rv-m2", "m.csv", "-o", ""], ["report", ""], ["calibrate", "rv-m2", "--output="]]
+)
+def test_an_empty_argument_is_not_the_working_directory(words, capsys):
+    assert main(words) == 2
+    assert "an argument is empty. A variable of the shell" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(

@@ -434,3 +434,11 @@ def test_numbers_that_stand_for_nothing_seen_are_named(value: float, columns: li
     data.loc[[4, 9], columns] = value
     with pytest.raises(InputError, match=r"in rows 5 and 10, .*Leave the cells empty"):
         check_against(Measurements.from_dataframe(data), robot)
+
+
+def test_a_reading_that_no_joint_can_have() -> None:
+    robot = Robot.load("ur10")
+    rows = table(robot, readings(robot))
+    rows.loc[3, "q2"] = 1e308
+    with pytest.raises(InputError, match=r"joint 2 reads up to 1e\+308 rad in row 4"):
+        check_against(Measurements.from_dataframe(rows), robot)

@@ -25,8 +25,10 @@ from truearm.fits.options import Options
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
 from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
+from truearm.reporting.parts import Figure, Text
 from truearm.reporting.report import report
 from truearm.reporting.script import licence_notice
+from truearm.reporting.varying import varying
 from truearm.reporting.waves import strongest_wave
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.simulation.imperfections import Deflection, Mass
@@ -346,6 +348,32 @@ def test_a_wave_is_found_and_a_line_is_none():
     assert strongest_wave(x, np.exp(-x / 100.0)) is None
 
 
+@pytest.mark.parametrize(
+    ("model", "joints"),
+    [
+        ("regions", "joint 2, joint 3, joint 4 or joint 5"),
+        ("fcmac", "joint 4 or joint 5"),
+        ("cmac", "joint 4 or joint 5"),
+    ],
+)
+def test_a_scheme_is_not_said_to_vary_along_joints_that_it_does_not_divide(reports, model, joints):
+    words = words_of(reports[model].html)
+    assert f"The {model} model does not vary along {joints}." in words
+    assert ("Variation along joint 3" in words) == (model != "regions")
+    assert "Variation along joint 4" not in words
+    assert "varies by 0.0000" not in words
+    assert "an amplitude of 0.0000" not in words
+
+
+def test_a_scheme_of_one_region_is_said_not_to_vary_and_has_no_map_of_what_varies():
+    arm = VirtualArm.paper(seed=2)
+    found = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="regions", most_regions=1)
+    parts = varying(Facts(found)).parts
+    (text,) = (part for part in parts if isinstance(part, Text))
+    assert "The regions model does not vary along any joint." in text.words
+    assert not [part for part in parts if isinstance(part, Figure) and "Which parameter" in part.title]
+
+
 def test_slices_are_deviations_from_their_means(reports):
     figures = figures_of(reports["variable"].html)["figures"]
     titles = [title for title, _ in reports["variable"].figures]
@@ -390,7 +418,9 @@ def test_where_no_pose_was_planned_to_validate_the_options_do_not_say_that_some_
     table = arm.measure_table(arm.poses(60))
     table["purpose"] = np.where(table.index % 3 == 0, "validate", "train")
     found = report(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant"))
-    assert f"{planned} yes" in words_of(found.html)
+    assert f"{planned} yes, 20 rows" in words_of(found.html)
+    assert "share of the rows held out not drawn" in words_of(found.html)
+    assert "share of the rows held out 0.3" in words_of(reports["constant"].html)
 
 
 def test_every_option_has_words():

@@ -172,6 +172,14 @@ def test_a_wave_within_its_band_is_no_finding(amplitude, told):
     assert ("A wave with a period" in in_words("theta1", "deg", x, values, "deg", 0.0076)) == told
 
 
+@pytest.mark.parametrize("sure", [None, 1e-7])
+def test_a_curve_of_rounding_alone_has_neither_size_nor_wave(sure):
+    x = np.linspace(-150.0, 150.0, 121)
+    words = in_words("theta1", "deg", x, 1e-5 * np.sin(2.0 * np.pi * x / 50.0), "deg", sure)
+    assert "varies by less than 0.0001 deg" in words
+    assert "A wave" not in words
+
+
 def test_distances_from_the_mean_of_a_pose_are_those_of_the_table():
     robot, data = repeated_measurements(sides_apart_mm=0.0, noise_mm=0.05)
     points = data.targets[1::2, 0].reshape(-1, 8, 3)

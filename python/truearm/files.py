@@ -3,6 +3,7 @@
 import os
 import secrets
 import stat
+import tempfile
 import tomllib
 from collections.abc import Iterable
 from contextlib import suppress
@@ -252,7 +253,21 @@ def check_output(output: Path, *inputs: Path | str | None) -> None:
         UsageError: If it is one of the inputs.
     """
     check_place(output)
+    if not _is_stream(output):
+        check_takes_files((followed(output) if output.is_symlink() else output).parent)
     refuse_own_input(output, *inputs)
+
+
+def check_takes_files(directory: Path) -> None:
+    """Check before long work, by trying, that something can be made in a directory: permissions do not tell.
+
+    Raises:
+        InputError: If nothing can.
+    """
+    try:
+        Path(tempfile.mkdtemp(prefix=".", dir=directory)).rmdir()
+    except OSError as error:
+        raise InputError(f"nothing can be written here: {_reason(error)}", where=str(directory)) from None
 
 
 def _beside(path: Path, data: bytes) -> Path:

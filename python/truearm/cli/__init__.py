@@ -12,6 +12,7 @@ from typing import Final
 from truearm.cli import console
 from truearm.cli.display import DISPLAY
 from truearm.cli.entry import Entry
+from truearm.errors import UsageError
 
 COMMANDS: Final = (
     Entry("demo", "truearm.cli.demo", "The whole way on a virtual arm."),
@@ -53,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     console.say_all()
     try:
+        _check_none_empty(given)
         from truearm.cli.lazy import build
 
         return build(COMMANDS, HELP)(given)
@@ -64,3 +66,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
     finally:
         DISPLAY.clear()
+
+
+def _check_none_empty(words: Sequence[str]) -> None:
+    """Raise UsageError where an argument is empty: as a path it would be the working directory."""
+    for before, word in zip(["", *words], words, strict=False):
+        name, equals, value = word.partition("=")
+        if not word or (name.startswith("--") and equals and not value):
+            raise UsageError(
+                "an argument is empty",
+                where=name or (before if before.startswith("-") else ""),
+                rule="A variable of the shell that is not set leaves such behind",
+                way_out="Give it a value, or leave the option out",
+            )

@@ -22,7 +22,15 @@ from truearm.cli.progress import told_stages
 from truearm.cli.report import make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
-from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, remove, write_whole
+from truearm.files import (
+    check_takes_files,
+    is_file,
+    make_directory,
+    read_bytes,
+    refuse_own_input,
+    remove,
+    write_whole,
+)
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.result_names import CALIBRATION_NAME, REPORT_NAME, SUMMARY_NAME
 from truearm.stages import Stages
@@ -186,6 +194,7 @@ def check_directory(output: Path) -> None:
         raise InputError("this is a file", where=str(there), rule="-o names a directory")
     if not os.access(there, os.W_OK):
         raise InputError("no permission to write here", where=str(there), way_out="Name another with -o")
+    check_takes_files(there)
 
 
 def bound_std(calibration: "Calibration", stages: Stages) -> None:
@@ -328,7 +337,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
         say_wrapped(f"Training, {details.epochs} epochs, {left}: {details.ended}.")
     if ratios is not None:
         words = ", ".join(f"{name} {ratio:.1f}" for name, ratio in ratios.items())
-        say(f"Mean error in multiples of the repeatability: {words}.")
+        say_wrapped(f"Mean error in multiples of the repeatability: {words}.")
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
-from truearm.errors import UsageError, typed
+from truearm.errors import InputError, UsageError, typed
 from truearm.files import check_output, write_whole
 from truearm.result_names import CALIBRATION_NAME, REPORT_NAME
 
@@ -95,6 +95,8 @@ def command(
 
 def _beside(calibration: Path) -> Path:
     """Where the report of a file goes: several calibrations may lie in one directory."""
+    if calibration.is_dir():
+        raise InputError("this is a directory", where=str(calibration), rule="A calibration is a file")
     if calibration.name == CALIBRATION_NAME:
         return calibration.with_name(REPORT_NAME)
     return calibration.with_suffix(PAGE)

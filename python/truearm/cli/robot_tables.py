@@ -70,7 +70,7 @@ def _print_coupling(robot: Robot) -> None:
 def _print_verdict(robot: Robot, notices: list[Notice]) -> None:
     x, y, z = MM_PER_METRE * robot.position(np.clip(0.0, robot.limits[:, 0], robot.limits[:, 1]))
     place = ", ".join(_number(value) for value in (x, y, z))
-    say(f"Tool at zero readings, or at the nearest limit: {place} mm")
+    say_wrapped(f"Tool at zero readings, or at the nearest limit: {place} mm")
     warn(notices)
     say("The file is in order." if not notices else "The file can be used; see the warnings.")
 

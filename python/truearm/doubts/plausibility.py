@@ -53,6 +53,8 @@ APART_M: Final = 0.01
 """No arm comes back to the same readings so far from where it was."""
 NO_LENGTH_M: Final = 1e9
 """In no unit that is mistaken for metres points lie so far apart."""
+NO_TURN_RAD: Final = 1e6
+"""In no unit that is mistaken for radians a joint turns so far."""
 NO_REACH_M: Final = 2e3
 """Points that lie so far apart in metres are no gross errors of an instrument: it wrote something else."""
 SHORTEST_M: Final = 0.005
@@ -83,12 +85,13 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
         What the user should know: joints outside their limits.
 
     Raises:
-        InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians,
-            or millimetres of a prismatic joint as metres.
+        InputError: If there are no rows, the number or kind of joints differs, a reading is none that a joint
+            can have, degrees were read as radians, or millimetres of a prismatic joint as metres.
     """
     if len(measurements) == 0:
         raise InputError("the measurements have no rows", rule="What is measured is at least one pose")
     measurements.require_joint_count(robot.joint_count)
+    _check_far_readings(measurements, robot)
     _check_kinds(measurements, robot)
     check_degrees(measurements, robot)
     _check_strokes(measurements, robot)
@@ -128,6 +131,24 @@ def _check_far(measurements: Measurements, most: float) -> None:
         where=", ".join(measurements.files),
         rule="No arm reaches so far: the instrument may have written such a number where it saw nothing",
         way_out="Leave the cells empty where nothing was measured, or leave these rows out",
+    )
+
+
+def _check_far_readings(measurements: Measurements, robot: Robot) -> None:
+    """Raise InputError where a joint is said to have turned or slid as far as none does, in whatever unit."""
+    most = np.array([NO_LENGTH_M if kind == "prismatic" else NO_TURN_RAD for kind in robot.joints])
+    far = np.abs(measurements.readings) > most
+    if not far.any():
+        return
+    joint = int(np.argmax(far.any(axis=0)))
+    unit = "m" if robot.joints[joint] == "prismatic" else "rad"
+    value = np.abs(measurements.readings[:, joint]).max()
+    raise InputError(
+        f"joint {joint + 1} reads up to {value:.4g} {unit} in {measurements.row_names(far[:, joint])}",
+        where=", ".join(measurements.files),
+        rule=f"No joint goes beyond {most[joint]:g} {unit}: such a number may have been written where the "
+        "robot knew none",
+        way_out="Leave these rows out",
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Item
 
-from truearm.errors import Notice
+from truearm.errors import Notice, UsageError
 from truearm.files import parsed, read_text, write_whole
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.programs.environment import Frame
@@ -62,8 +62,11 @@ def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: 
     controller's world where the file has that. Comments of the file stay where they can.
 
     Raises:
+        UsageError: If the name is blank.
         InputError: If the file breaks a rule or cannot be written, or has two worlds.
     """
+    if not name.strip():
+        raise UsageError(f'the name of the {found.kind} is "{name}"', rule="Programs call it by a name")
     held = _text(Path(path))
     content = parsed(held, where=str(path))
     world = _world(held, found.kind, name, where=str(path))

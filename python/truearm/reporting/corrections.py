@@ -1,6 +1,8 @@
 """Chapter: what compensation does: how large its corrections are, and what it refuses."""
 
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,9 +15,15 @@ from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.facts import ROWS, Facts
 from truearm.reporting.numbers import fixed, lean, short, signed, without_zeros
+from truearm.reporting.parameters import shifted
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
+from truearm.reporting.waypoints import Waypoints
+from truearm.rows.visits import pose_numbers
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 LARGEST: Final = 6
 
@@ -35,7 +43,7 @@ def compensation(facts: Facts) -> Section:
     point = "flange" if calibration.selection.distances else "measured target"
     whose = "robot file's tool" if facts.names_tool else f"{point}, as the robot file names no tool"
     words = _overall(found, (task, f"the {whose}"), len(rows.data)) + facts.at_features
-    parts: list[Part] = [Text(words), *_sizes(facts, found)]
+    parts: list[Part] = [Text(words), *_sizes(facts, made)]
     return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
 
 
@@ -52,36 +60,14 @@ def _overall(found: Compensated, asked: tuple[Task, str], count: int) -> str:
     )
 
 
-def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
-    """How far each joint is corrected."""
+def _sizes(facts: Facts, made: Waypoints) -> list[Figure]:
+    """How far each joint is corrected, and the tool with it."""
+    found = made.found
     good = ~found.refused
     if not good.any():
         return []
-    change = facts.shown(found.q[good] - found.nominal[good])
     shift = found.correction_mm[good]
-    traces = [
-        {
-            "type": "box",
-            "name": f"{joint + 1}",
-            "y": lean(change[:, joint], 3),
-            "boxpoints": False,
-            "marker": {"color": "@variable"},
-            "line": {"color": "@variable"},
-            "fillcolor": "@band",
-        }
-        for joint in range(change.shape[1])
-    ]
-    widest = int(np.argmax(np.abs(change).max(axis=0)))
     most, middle = short(float(shift.max()), float(np.median(shift)))
-    units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
-    figure = Figure(
-        "Corrections of the joints",
-        f"Joint {widest + 1} is corrected most, by up to {np.abs(change[:, widest]).max():.3f} "
-        f"{facts.unit(widest)}. The tool is moved by {middle} mm in the median and {most} mm at most.",
-        traces,
-        {"xaxis": axis("joint"), "yaxis": axis(f"correction, {units}")},
-        height=300,
-    )
     trace = {"type": "histogram", "x": lean(shift), "nbinsx": 40, "marker": {"color": "@variable"}}
     sizes = Figure(
         "Shift of the tool",
@@ -91,22 +77,83 @@ def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
         {"xaxis": axis("shift of the tool, mm", rangemode="tozero"), "yaxis": axis(ROWS), "bargap": 0.05},
         height=300,
     )
-    return [figure, sizes]
+    return [*_of_joints(facts, found, good), sizes]
+
+
+def _of_joints(facts: Facts, found: Compensated, good: Mask) -> list[Figure]:
+    """Corrections of the joints at `good` waypoints (n,), a figure a unit: mm would flatten degrees."""
+    change = found.q[good] - found.nominal[good]
+    moved_mm = np.median(tool_moves_mm(facts, found.nominal[good], change), axis=0)
+    by_unit: dict[str, list[int]] = {}
+    for joint in range(len(facts.joints)):
+        by_unit.setdefault(facts.unit(joint), []).append(joint)
+    if len(by_unit) == 1:
+        return [_boxes("Corrections of the joints", facts, change, moved_mm, range(len(facts.joints)))]
+    return [
+        _boxes(f"Corrections of the joints, {unit}", facts, change, moved_mm, joints)
+        for unit, joints in by_unit.items()
+    ]
+
+
+def tool_moves_mm(facts: Facts, readings: Floats, change: Floats) -> Floats:
+    """How far each joint's change (n, N), rad and m, moves the tool by itself (n, N), mm, to first order.
+
+    Args:
+        facts: Of the calibration; its nominal arm tells.
+        readings: Where the joints are (n, N), rad and m.
+        change: How they change.
+    """
+    robot = facts.calibration.robot
+    end = robot.tool if facts.names_tool else shifted(facts.point)
+    jacobian = replace(robot, tool=end).joint_jacobian(readings)
+    return np.asarray(MM_PER_METRE * np.linalg.norm(jacobian * change[:, None, :], axis=1))
+
+
+def _boxes(title: str, facts: Facts, change: Floats, moved_mm: Floats, joints: Sequence[int]) -> Figure:
+    """Corrections (n, N), rad and m, of joints of one unit, with how far those of each (N,) move the tool."""
+    shown, unit = facts.shown(change), facts.unit(joints[0])
+    traces = [
+        {
+            "type": "box",
+            "name": f"{joint + 1}",
+            "y": lean(shown[:, joint], 3),
+            "boxpoints": False,
+            "marker": {"color": "@variable"},
+            "line": {"color": "@variable"},
+            "fillcolor": "@band",
+        }
+        for joint in joints
+    ]
+    first = max(joints, key=lambda joint: float(moved_mm[joint]))
+    sizes, which = np.abs(shown[:, first]), f"The corrections of joint {first + 1}"
+    which = which if len(joints) == 1 else f"{which} move the tool most. They"
+    return Figure(
+        title,
+        f"{which} are {np.median(sizes):.3f} {unit} in the median, and alone would move the tool by "
+        f"{short(float(moved_mm[first]))[0]} mm; the largest is {sizes.max():.3f} {unit}.",
+        traces,
+        {"xaxis": axis("joint"), "yaxis": axis(f"correction, {unit}")},
+        height=300,
+    )
 
 
 def largest(facts: Facts, data: Measurements, found: Compensated) -> list[Table]:
-    """The rows with the largest corrections; none where all are refused."""
+    """Poses with the largest corrections, each by its row with the largest; none where all are refused."""
     shift = np.where(found.refused, -1.0, found.correction_mm)
-    order = [k for k in np.argsort(-shift, kind="stable")[:LARGEST] if shift[k] >= 0.0]
-    change = facts.shown(found.q - found.nominal)
-    units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
+    pose = pose_numbers(data.readings, data.group)
+    order = [k for k in _first_of_each(pose, np.argsort(-shift, kind="stable"))[:LARGEST] if shift[k] >= 0.0]
+    change, units = facts.shown(found.q - found.nominal), [facts.unit(k) for k in range(len(facts.joints))]
+    one = len(set(units)) == 1
     rows = [
         [
             _row_name(data, k),
             fixed(found.correction_mm[k]),
             fixed(found.correction_mrad[k]),
             fixed(found.std_mm[k]),
-            ", ".join(signed(value, 3) for value in change[k]),
+            ", ".join(
+                signed(value, 3) + ("" if one else f" {unit}")
+                for value, unit in zip(change[k], units, strict=True)
+            ),
         ]
         for k in order
     ]
@@ -119,12 +166,19 @@ def largest(facts: Facts, data: Measurements, found: Compensated) -> list[Table]
             "shift, mm",
             "rotation, mrad",
             "standard deviation, mm",
-            f"corrections of the joints, {units}",
+            "corrections of the joints" + (f", {units[0]}" if one else ""),
         ],
         rows,
+        says="" if len(np.unique(pose)) == len(pose) else "Of rows of one pose, that with the largest.",
         left=(0, 4),
     )
     return [table]
+
+
+def _first_of_each(number: Rows, order: Rows) -> list[int]:
+    """Those of `order` (n,) that are the first of their number (n,)."""
+    _, first = np.unique(number[order], return_index=True)
+    return [int(k) for k in order[np.sort(first)]]
 
 
 def _row_name(data: Measurements, k: int) -> str:

@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 
 SHOWN_ALONG: Final = 3
 """Parameters whose curves are shown for each joint and feature."""
+LAST_DIGIT: Final = 1e-4
+"""Of what is told of curves, deg or mm."""
 SURE: Final = 2.0
 """Standard deviations of the band on either side."""
 
@@ -135,10 +137,11 @@ def in_words(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, s
     A wave within the band is none that these data show, and not told.
     """
     reach = float(np.ptp(values))
+    varies = _four(reach) if reach >= LAST_DIGIT else f"less than {_four(LAST_DIGIT)}"
     if sure is None:
-        start = f"{name} varies by {_four(reach)} {unit} over the measured range."
+        start = f"{name} varies by {varies} {unit} over the measured range."
         return start + _wave(q, values, joint_unit, unit)
-    start = f"{name} varies by {_four(reach)} {unit}; its 95 % band is {_four(2.0 * sure)} {unit} wide"
+    start = f"{name} varies by {varies} {unit}; its 95 % band is {_four(2.0 * sure)} {unit} wide"
     if reach < 2.0 * sure:
         return f"{start}: these data do not show whether it varies."
     return f"{start}.{_wave(q, values, joint_unit, unit, least=sure)}"
@@ -146,7 +149,7 @@ def in_words(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, s
 
 def _wave(q: Floats, values: Floats, joint_unit: str, unit: str, *, least: float = 0.0) -> str:
     wave = strongest_wave(q, values)
-    if wave is None or wave.amplitude <= least:
+    if wave is None or wave.amplitude < max(least, LAST_DIGIT):
         return ""
     return (
         f" A wave with a period of {short(wave.period)[0]} {joint_unit} and an amplitude of "

@@ -107,12 +107,13 @@ def standard_errors(facts: Facts) -> dict[str, float]:
 def effect_mm(facts: Facts) -> Floats:
     """How far one rad or m of each parameter moves the judged point (5 L,), mm, RMS over poses."""
     poses = facts.drawn(POSES)
-    chain = facts.calibration.arm.chain(facts.calibration.robot.flange @ _shifted(facts.point))
+    chain = facts.calibration.arm.chain(facts.calibration.robot.flange @ shifted(facts.point))
     jacobian = chain.parameter_jacobian(facts.calibration.robot.joints_from_readings(poses))
     return np.asarray(MM_PER_METRE * np.sqrt(np.square(jacobian).sum(axis=1).mean(axis=0)))
 
 
-def _shifted(point: Floats) -> Floats:
+def shifted(point: Floats) -> Floats:
+    """The transform (4, 4) of a point (3,) that is not turned."""
     transform = np.eye(4)
     transform[:3, 3] = point
     return transform

@@ -79,10 +79,14 @@ def _options(facts: Facts) -> Table:
 
 
 def _value(facts: Facts, name: str, value: Any) -> str:  # noqa: ANN401
-    """The value of an option; of poses planned to validate, whether there were any."""
+    """The value of an option; of the rows held out, whether they were drawn, or planned to validate."""
     former = facts.calibration.validation.to_dict() if facts.update is None else facts.update["former"]
-    if name == "by_purpose" and value and not former.get("n_planned"):
-        return "none was"
+    planned = former.get("n_planned") or 0
+    if name == "by_purpose" and value:
+        return f"yes, {count_of(planned, 'row')}" if planned else "none was"
+    if name == "holdout" and planned:
+        whole = planned >= former["n_holdout"]
+        return "not drawn" if whole else f"{value}, drawn in files without such poses"
     return in_words(name, value)
 
 

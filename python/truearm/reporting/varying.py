@@ -4,19 +4,26 @@ import json
 from collections.abc import Sequence
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truearm.fits.models import CONSTANT, VARIABLE
 from truearm.reporting.axes import coupling_words
 from truearm.reporting.curves import along, influence
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
-from truearm.reporting.numbers import fixed
+from truearm.reporting.numbers import fixed, listed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.region_tree import region_tree
 from truearm.reporting.slices import slices
-from truearm.reporting.sweeps import influence_mm
+from truearm.reporting.sweeps import influence_mm, swept_names
 from truearm.storage.summary import WAVE, waves_in_words
 
 Block = dict[str, Any]
+Floats = NDArray[np.float64]
+
+ROUNDING_MM: Final = 1e-9
+"""An effect that is smaller is none but rounding."""
 
 
 def varying(facts: Facts) -> Section:
@@ -32,16 +39,29 @@ def varying(facts: Facts) -> Section:
     )
     if facts.best == VARIABLE and facts.readings is not None:
         words += " Bands are two standard deviations of that deviation to either side."
-    parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
+    flat = without_effect(facts, effects)
+    if flat:
+        names = [name for k, name in enumerate(swept_names(facts)) if k in flat]
+        where = "any joint" if len(flat) == len(effects) else listed(names, last="or")
+        words += f" The {facts.best} model does not vary along {where}."
+    parts: list[Part] = [Text(words, is_note=True)]
+    parts += [influence(facts, effects)] if len(flat) < len(effects) else []
     tree = region_tree(facts)
     parts += [tree] if tree is not None else []
-    parts += [along(facts, which, effects[which]) for which in range(len(effects))]
+    parts += [along(facts, which, effects[which]) for which in range(len(effects)) if which not in flat]
     parts += slices(facts)
     weight = sag(facts)
     parts += [weight] if weight is not None else []
     blocks = facts.summary["blocks"]
     parts += [_blocks(facts)] if blocks else []
     return Section(title, parts)
+
+
+def without_effect(facts: Facts, effects: Floats) -> list[int]:
+    """Inputs along which a scheme does not vary, as joints that it does not divide; effects (I, 5 L), mm."""
+    if facts.calibration.scheme is None:
+        return []
+    return [k for k, moved in enumerate(effects) if moved.max() < ROUNDING_MM]
 
 
 def _blocks(facts: Facts) -> Table:

@@ -26,7 +26,9 @@ def varying_parameters(facts: Facts) -> Table:
     whole = corrections(facts, poses)
     effects = effect_mm(facts) * np.sqrt(np.square(whole).mean(axis=0))
     spread = standard_deviations(facts, list(candidates.columns))
+    only_vary = set(candidates.names) - {candidates.names[k] for k in candidates.constant}
     unknown = {name for name in calibration.identifiability.undetermined if name in candidates.names}
+    instead = dict.fromkeys(unknown, NOMINAL) | dict.fromkeys(only_vary, NONE)
     rows = []
     for name, column in zip(candidates.names, candidates.columns, strict=True):
         unit, values = per_unit(column), whole[:, column]
@@ -36,9 +38,11 @@ def varying_parameters(facts: Facts) -> Table:
                 name,
                 unit_of(column),
                 f"{nominal[column] / unit:.3f}",
-                NOMINAL if name in unknown and constants[column] == 0.0 else signed(constants[column] / unit),
+                instead[name]
+                if name in instead and not constants[column]
+                else signed(constants[column] / unit),
                 *(signed(value / unit) for value in ends),
-                *([] if spread is None else [f"{spread[column] / unit:.4f}"]),
+                *([] if spread is None else ["" if name in only_vary else f"{spread[column] / unit:.4f}"]),
                 f"{effects[column]:.3f}",
             ]
         )
@@ -51,6 +55,11 @@ def varying_parameters(facts: Facts) -> Table:
         says += " Compensation uses the latter."
     if unknown:
         says += f" Where the poses do not determine a constant, the maker's value stays: {NOMINAL}."
+    if only_vary:
+        says += (
+            f" The d of a sliding joint only varies: it has no constant ({NONE}), which frame and target "
+            "take over, and no standard deviation of the whole."
+        )
     if spread is not None:
         says += (
             " Standard deviations are of the whole in a typical pose; parameters are correlated, so that "
@@ -66,6 +75,7 @@ def varying_parameters(facts: Facts) -> Table:
     )
 
 
+NONE: Final = "none"
 NOMINAL: Final = "nominal"
 COLUMNS: Final = ("", "unit", "nominal", "constant part", "mean", "smallest", "largest")
 
