@@ -11,7 +11,7 @@ from tests.cell_support import cell_text
 from tests.recorded import COUNT, Recorded
 from truearm.cell import Cell
 from truearm.cell.checks import unsure_steps
-from truearm.cell.in_a_row import REPEATED, UNSEEN, UNSEEN_IN_A_ROW, Far
+from truearm.cell.in_a_row import REPEATED, TAKEN_BACK, UNMEASURED_IN_A_ROW, Far
 from truearm.cell.measuring import DONE
 from truearm.cell.playback import PlaybackSensor
 from truearm.cell.prediction import Prediction
@@ -88,9 +88,9 @@ def test_a_target_that_is_lost_uses_up_no_poses(seen):
         assert step is not None
         assert (step.kind, step.pose) == ("pose", 8)
         assert session.readings_of(step.step) == []
-        told = session.rows("SELECT step FROM events WHERE kind = ? ORDER BY id", (UNSEEN,))
+        told = session.rows("SELECT step FROM events WHERE kind = ? ORDER BY id", (TAKEN_BACK,))
         assert told[0] == (step.step,)
-        assert len(told) == UNSEEN_IN_A_ROW
+        assert len(told) == UNMEASURED_IN_A_ROW
     # It is still lost, which the check tells before any pose is tried.
     with pytest.raises(WorkError, match="the first contact could not be measured again"):
         seen.measure()
@@ -190,4 +190,4 @@ def test_a_check_is_asked_for_once_until_a_pose_is_near_its_prediction():
         far.accepted(far=each == "f")
         asked.append(far.asks_for_check())
     assert [k for k, each in enumerate(asked) if each] == [2, 8, 14]
-    assert UNSEEN_IN_A_ROW == 5
+    assert UNMEASURED_IN_A_ROW == 5

@@ -18,6 +18,7 @@ import pytest
 import truearm as ta
 from truearm.cli import main
 from truearm.serving import Bounds, Server
+from truearm.serving.vanished import probe
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.streaming import CorrectionStream
 
@@ -285,6 +286,39 @@ def test_clients_that_vanish_leave_no_trace(port):
         with Client(port) as client:
             client.send({"q": HOME})
     assert is_served(port)
+
+
+def test_who_vanishes_without_a_word_gives_the_connection_back(calib):
+    with served_here(calib, connections=1, vanished_s=1.5) as port:
+        gone = Client(port)
+        gone.read()
+        with Client(port) as other:
+            assert other.read()["error"] == "more than 1 connections"
+        vanish(gone)
+        assert is_served(port)
+
+
+def vanish(client):
+    """Leave without a word, as where power or a cable fails; skips the test where that is not allowed."""
+    repairs = 19
+    try:
+        client.socket.setsockopt(socket.IPPROTO_TCP, repairs, 1)
+    except OSError:
+        client.__exit__()
+        pytest.skip("only Linux lets a socket close in silence, and whoever may administer its network")
+    client.__exit__()
+
+
+@pytest.mark.parametrize(("vanished_s", "seconds"), [(40.0, [20, 4, 5]), (0.5, [1, 1, 5])])
+def test_silent_connections_are_probed(vanished_s, seconds):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        client = socket.create_connection(server.getsockname())
+        with client, server.accept()[0] as peer:
+            probe(peer, vanished_s)
+            assert peer.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+            for name, wanted in zip(("TCP_KEEPIDLE", "TCP_KEEPINTVL", "TCP_KEEPCNT"), seconds, strict=True):
+                if hasattr(socket, name):
+                    assert peer.getsockopt(socket.IPPROTO_TCP, getattr(socket, name)) == wanted
 
 
 def test_a_token_is_asked_for(calib, tmp_path):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.checks import unsure_steps
 from truearm.cell.poses_file import GROUP
+from truearm.cell.scatter import sigma_of_mean_m
 from truearm.cell.session import Session
 from truearm.measurements import Measurements
 from truearm.tables.columns import APPROACH, POSE, PURPOSE, READINGS
@@ -95,7 +96,7 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
         merged[PURPOSE] = first["purpose"]
     merged |= {f"q{j + 1}": value for j, value in enumerate(joints.tolist())}
     merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
-    merged["sigma"] = float(np.mean([row["sigma"] for row in rows]) / np.sqrt(len(rows)))
+    merged["sigma"] = sigma_of_mean_m([row["sigma"] for row in rows])
     turned = [[row[name] for name in TURN] for row in rows if row["qw"] is not None]
     if turned:
         turns = np.array(turned, dtype=np.float64)

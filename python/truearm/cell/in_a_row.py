@@ -1,4 +1,4 @@
-"""What is seen over several poses: none of the target, far from predictions, or the same point again."""
+"""What is seen over several poses: nothing to believe, far from predictions, or the same point again."""
 
 import math
 from dataclasses import replace
@@ -13,42 +13,49 @@ from truearm.errors import WorkError
 
 Floats = NDArray[np.float64]
 
-UNSEEN_IN_A_ROW: Final = 5
+UNMEASURED_IN_A_ROW: Final = 5
 FAR_IN_A_ROW: Final = 3
-UNSEEN: Final = "unseen"
-"""Kind of the event at each of the poses that were taken back."""
+TAKEN_BACK: Final = "taken back"
+"""Kind of the event at each of the steps that were taken back."""
 TAKEN_BACK_BEFORE: Final = "SELECT 1 FROM events WHERE kind = ? AND step BETWEEN ? AND ? LIMIT 1"
 LAST_REASON: Final = (
     "SELECT reason FROM readings WHERE step <= ? AND reason != '' ORDER BY step DESC, attempt DESC LIMIT 1"
 )
+LAST_OUTCOME: Final = "SELECT reason FROM outcomes WHERE step = ?"
 REPEATED: Final = "it repeats, to the last digit, the point of another pose"
 NOUNS: Final = {"registration": "contacts for the frame", "pose": "poses"}
+STEADY: Final = (
+    "See whether target, arm and instrument are steady, and whether readings of a pose can agree to agree_mm"
+)
+SEE_TO: Final = {False: "See to the target and the line of sight", True: STEADY}
+"""What to do, where no reading was valid, and where some were."""
 WAYS_OUT: Final = {
-    "registration": "See to the target and the line of sight, and to [world] in the cell file. Then the same "
-    "command measures these contacts again. With another [target] name a new session with -o",
-    "pose": "See to the target and the line of sight. Then the same command measures these poses again, and "
-    "skips those that it does not see then either",
+    "registration": "{see_to}, and to [world] in the cell file. Then the same command measures these "
+    "contacts again. With another [target] name a new session with -o",
+    "pose": "{see_to}. Then the same command measures these poses again, and skips those that it cannot "
+    "measure then either",
 }
 
 
-class Unseen:
-    """Poses in a row that were given up without any valid reading.
+class Unmeasured:
+    """Poses in a row that were given up: no reading was valid, or those that were contradict each other.
 
-    One of them may be hidden; many say that the target is lost, and would use up all that are left. Checks
-    that see nothing, and poses that a device refuses, are no part of such a row and do not end it.
+    One of them may be hidden, or unsteady; many say that the target is lost, or that the instrument cannot be
+    believed, and would use up all that are left. Checks that are given up, and poses that a device refuses,
+    are no part of such a row and do not end it.
     """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._kind = ""
+        self._kind, self._seen = "", False
         self._steps: list[int] = []
 
-    def seen(self) -> None:
-        """A reading was valid."""
+    def measured(self) -> None:
+        """A step was measured."""
         self._steps.clear()
 
-    def given_up(self, step: Step) -> None:
-        """A step was given up without any valid reading.
+    def given_up(self, step: Step, *, seen: bool) -> None:
+        """A step was given up, with valid readings or without (`seen`).
 
         Where it is the fifth in a row, their outcomes and readings are taken out of the session, which goes
         on at the first of them. Poses of which one was taken back before stay skipped, and counting begins
@@ -61,18 +68,35 @@ class Unseen:
             return
         if step.kind != self._kind:
             self._kind, self._steps = step.kind, []
+        self._seen = seen or (self._seen and bool(self._steps))
         self._steps.append(step.step)
-        if len(self._steps) < UNSEEN_IN_A_ROW:
+        if len(self._steps) < UNMEASURED_IN_A_ROW:
             return
+        what = f"{UNMEASURED_IN_A_ROW} {NOUNS[step.kind]} in a row {self._told(step)}"
+        if self.take_back(what):
+            raise WorkError(
+                what, where=step.kind, way_out=WAYS_OUT[step.kind].format(see_to=SEE_TO[self._seen])
+            )
+
+    def take_back(self, what: str) -> bool:
+        """Take the steps of the row as it is out of the session, for the reason `what`; whether that is done.
+
+        Poses of which one was taken back before stay skipped. Counting begins anew.
+        """
         steps, self._steps = self._steps, []
-        taken_back = self._session.rows(TAKEN_BACK_BEFORE, (UNSEEN, steps[0], step.step))
-        if taken_back and step.kind == "pose":
-            return
-        reasons = self._session.rows(LAST_REASON, (step.step,))
+        if not steps:
+            return False
+        before = self._session.rows(TAKEN_BACK_BEFORE, (TAKEN_BACK, steps[0], steps[-1]))
+        if before and self._kind == "pose":
+            return False
+        self._session.take_back(steps, TAKEN_BACK, what)
+        return True
+
+    def _told(self, last: Step) -> str:
+        """What became of the steps, in words."""
+        reasons = self._session.rows(LAST_OUTCOME if self._seen else LAST_REASON, (last.step,))
         said = f"; the last: {reasons[0][0]}" if reasons else ""
-        what = f"{UNSEEN_IN_A_ROW} {NOUNS[step.kind]} in a row had no valid reading{said}"
-        self._session.take_back(steps, UNSEEN, what)
-        raise WorkError(what, where=step.kind, way_out=WAYS_OUT[step.kind])
+        return f"{'could not be measured' if self._seen else 'had no valid reading'}{said}"
 
 
 class Far:

@@ -7,6 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.cell.scatter import explained_m
 from truearm.cell.session import Point, Stored
 
 Floats = NDArray[np.float64]
@@ -41,7 +42,8 @@ class Rules(NamedTuple):
     Attributes:
         contacts: Readings that have to agree.
         attempts: How many are made at the most.
-        agree_m: How far readings of a pose may be from one of them.
+        agree_m: How far readings of a pose may be from one of them; farther only as far as what they state
+            as their standard deviations explains.
         likely_m: How far a reading may be from the prediction without being suspicious.
     """
 
@@ -62,7 +64,7 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
         return NOTHING_YET
     valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
     points = [point for _, point in valid]
-    agreeing = _largest_cluster(points, rules.agree_m)
+    agreeing = _largest_cluster(points, [reading.sigma_m for reading, _ in valid], rules.agree_m)
     mean = mean_point([points[k] for k in agreeing]) if agreeing else None
     off_m = math.inf if mean is None else math.dist(mean, expected.tolist())
     far = mean is not None and off_m > rules.likely_m
@@ -78,11 +80,15 @@ def mean_point(points: Sequence[Point]) -> Point:
     return tuple([math.fsum(column) / len(points) for column in zip(*points, strict=True)])
 
 
-def _largest_cluster(points: Sequence[Point], within: float) -> list[int]:
-    """Numbers of the most points that are all within a distance of one of them, the first such."""
+def _largest_cluster(points: Sequence[Point], sigmas_m: Sequence[float], agree_m: float) -> list[int]:
+    """Numbers of the most points that all agree with one of them, the first such."""
     best: list[int] = []
-    for centre in points:
-        near = [k for k, point in enumerate(points) if math.dist(point, centre) <= within]
+    for centre, sigma_m in zip(points, sigmas_m, strict=True):
+        near = [
+            k
+            for k, (point, own_m) in enumerate(zip(points, sigmas_m, strict=True))
+            if math.dist(point, centre) <= max(agree_m, explained_m(sigma_m, own_m))
+        ]
         if len(near) > len(best):
             best = near
     return best

@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NoReturn
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from truearm.cell.accepted import points_and_joints
 from truearm.cell.alone import alone
 from truearm.cell.at_rest import AtRest
 from truearm.cell.cell_file import Cell
-from truearm.cell.checks import last_check
+from truearm.cell.checks import CONTRADICTED, has_contradicted, raise_if_moved, raise_unsure, tells_nothing
+from truearm.cell.contacts import contacts_left, take_contacts_back
 from truearm.cell.crew import Crew, places_on_the_way
 from truearm.cell.device_errors import (
     Calls,
@@ -24,15 +25,16 @@ from truearm.cell.device_errors import (
     RefusedError,
     StoppedError,
 )
-from truearm.cell.in_a_row import Far, Frozen, Unseen
+from truearm.cell.in_a_row import Far, Frozen, Unmeasured
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading, checked_reading
 from truearm.cell.registering import register_cell
+from truearm.cell.scatter import told_coarse
 from truearm.cell.session import Session, Step, Stored
 from truearm.cell.stops import Stops, kind_of
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
-from truearm.errors import WorkError, count_of
+from truearm.errors import count_of
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
@@ -48,10 +50,6 @@ DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
 OTHERS_BETWEEN: Final = "SELECT 1 FROM steps WHERE step >= ? AND step < ? AND kind != 'check' LIMIT 1"
 NO_BETTER: Final = "readings are still judged by the registered frame, which predicts them no worse"
 UNCHECKED: Final = "no contact could be measured again: whether anything has moved is not known"
-CONTACTS_LEFT: Final = (
-    "SELECT 1 FROM steps LEFT JOIN outcomes USING (step) "
-    "WHERE kind = 'registration' AND outcome IS NULL LIMIT 1"
-)
 
 
 @dataclass(frozen=True)
@@ -85,17 +83,22 @@ class Process:
         self._prediction = Prediction(cell)
         self._halted, self._ended = threading.Event(), threading.Event()
         self._crew = Crew(cell, session.add_event, self._halted)
-        self._unseen, self._far, self._frozen = Unseen(session), Far(), Frozen()
+        self._unmeasured, self._far, self._frozen = Unmeasured(session), Far(), Frozen()
         self._stops = Stops(session)
         self._recoveries = self._given_up = 0
+        self._is_coarse = False
         self._total = session.rows("SELECT count(*) FROM steps")[0][0]
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
         self._boundaries = boundaries(self._process.stretch, self._poses)
         self._measured = session.measured_poses()
-        self._done = self._done_before = int(session.rows(DONE_STEPS)[0][0])
+        self._count_done()
+        self._began = time.monotonic()
+
+    def _count_done(self) -> None:
+        """Know what is done already."""
+        self._done = self._done_before = int(self._session.rows(DONE_STEPS)[0][0])
         # Readings may be left of the last step that a former process had begun; before it may be a check.
         self._begun = self._done_before + 1
-        self._began = time.monotonic()
 
     def run(self) -> str:
         """Measure until all is done, or well enough; says which.
@@ -108,7 +111,7 @@ class Process:
         self._resume()
         end = self._end()
         if end is not None:
-            self._check_drift()
+            raise_if_moved(self._session, self._process.drift_mm)
             return end
         with alone(self._cell):
             return self._driven()
@@ -209,20 +212,27 @@ class Process:
             return checked_reading(self._cell.sensor.measure())
 
     def _works(self, reading: Reading) -> None:
-        """Devices work where there is a reading, and the target is seen where it is valid."""
+        """Devices work where there is a reading; a valid one tells how well the instrument measures."""
         self._recoveries = self._given_up = 0
-        if reading.valid:
-            self._unseen.seen()
+        if self._is_coarse or not reading.valid:
+            return
+        words = told_coarse(reading.sigma_m, self._process)
+        if words:
+            self._is_coarse = True
+            self._session.add_event("coarse", words)
+            self._say(words)
 
     def _counted(self, step: Step, verdict: Verdict, readings: list[Stored]) -> bool:
         """Count a step that is done with among those before it; whether it is measured.
 
         Raises:
-            WorkError: If the target was not seen at too many in a row.
+            WorkError: If too many in a row were given up.
         """
-        if not any(reading.valid for reading in readings):
-            self._unseen.given_up(step)
         measured = verdict.decision == "accept"
+        if measured:
+            self._unmeasured.measured()
+        else:
+            self._unmeasured.given_up(step, seen=any(reading.valid for reading in readings))
         if step.kind == "pose" and measured:
             self._far.accepted(far=verdict.suspicious)
         return measured
@@ -365,8 +375,11 @@ class Process:
         """
         if not self._done_before:
             return
-        if not self._prediction.is_registered and not self._session.rows(CONTACTS_LEFT):
-            self._register()
+        if not self._prediction.is_registered and not contacts_left(self._session):
+            if take_contacts_back(self._session):
+                self._count_done()
+            else:
+                self._register()
         self._total += self._session.check_next()
 
     def _after_pose(self) -> bool:
@@ -391,56 +404,28 @@ class Process:
             f"{stretch.expected_mm:.3f} mm expected"
         )
 
-    def _check_drift(self) -> None:
-        """Raise if the last check of the first contact shows that something has moved."""
-        check = last_check(self._session)
-        if check is not None and check.off_mm > self._process.drift_mm:
-            raise WorkError(
-                f"the first contact is now {check.off_mm:.2f} mm from where it was",
-                where="check",
-                rule=f"The cell may drift by {self._process.drift_mm:g} mm (drift_mm)",
-                way_out=self._after_drift(),
-            )
-
-    def _after_drift(self) -> str:
-        if self._session.next_step() is None:
-            return (
-                "Find what moves. truearm session export keeps apart what was measured since the last good "
-                "check"
-            )
-        return (
-            "Find what moves. Once it is in its place again the same command goes on; else measure the rest "
-            "as a new session: a set-up of its own"
-        )
-
     def _checks_elsewhere(self, step: Step) -> bool:
         """Look at what a check tells; whether another contact is to be checked next, since it tells nothing.
 
         Raises:
-            WorkError: If something has moved; or if no contact can be measured again as a session goes on.
+            WorkError: If something has moved; or if no contact can be measured again, as a session goes on,
+                or with steps left and readings that contradict one another.
         """
-        check = last_check(self._session)
-        if check is not None and check.step == step.step:
-            self._check_drift()
+        if not tells_nothing(self._session, step.step):
+            raise_if_moved(self._session, self._process.drift_mm)
             return False
         if self._session.check_elsewhere(step.step):
             self._total += 1
             self._begun += 1
             return True
-        done_since = self._session.rows(OTHERS_BETWEEN, (self._done_before, step.step))
-        if not done_since:
-            self._raise_unsure()
+        contradicted = has_contradicted(self._session, step.step) and self._session.next_step() is not None
+        if contradicted or not self._session.rows(OTHERS_BETWEEN, (self._done_before, step.step)):
+            if contradicted:
+                self._unmeasured.take_back(CONTRADICTED)
+            raise_unsure(contradicted=contradicted)
         self._session.add_event("unchecked", UNCHECKED, step.step)
         self._say(UNCHECKED)
         return False
-
-    def _raise_unsure(self) -> NoReturn:
-        raise WorkError(
-            "the first contact could not be measured again",
-            where="check",
-            rule="A session goes on where it finds arm and instrument in their places",
-            way_out="truearm session show tells why. Put that right, then the same command goes on",
-        )
 
     def _tell(self, step: Step, verdict: Verdict) -> None:
         self._done = step.step + 1

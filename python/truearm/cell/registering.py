@@ -71,7 +71,8 @@ def _check_number(points: Floats) -> None:
             f"{len(points)} contacts for the frame succeeded",
             where="registration",
             rule=f"{LEAST_POSES} are needed at least",
-            way_out="truearm session show tells why the others failed",
+            way_out="truearm session show tells why the others failed. Put that right, then the same command "
+            "measures them again. With other poses name a new session with -o",
         )
 
 

@@ -4,13 +4,15 @@ from typing import Any
 
 from truearm.cell.checks import unchecked_poses
 from truearm.cell.session import Session
+from truearm.errors import Notice, list_rows
 
 
 def summary_of(session: Session) -> dict[str, Any]:
     """JSON values: poses, measured, skipped, open, readings and how many failed, frame, stretches, events.
 
     "complete" says whether no step is open, neither pose nor check. Beside them how many checks were measured
-    and skipped, and the poses of which nothing says whether something moved meanwhile.
+    and skipped, and the poses of which nothing says whether something moved meanwhile. What was skipped,
+    poses, contacts for the frame and checks, is listed with the pose, from 1, and the reason.
     """
     counts = {
         (kind, outcome): count
@@ -22,10 +24,7 @@ def summary_of(session: Session) -> dict[str, Any]:
     readings, invalid = session.rows("SELECT count(*), coalesce(sum(1 - valid), 0) FROM readings")[0]
     registration = session.rows("SELECT residual_mm, poses FROM registration")
     stretches = session.rows("SELECT measured, model, mean_mm, p95_mm, expected_mm FROM stretches ORDER BY 1")
-    skipped = session.rows(
-        "SELECT pose, reason FROM outcomes JOIN steps USING (step) "
-        "WHERE kind = 'pose' AND outcome = 'skipped'"
-    )
+    skipped = {kind: _skipped(session, kind) for kind in ("pose", "registration", "check")}
     events = session.rows("SELECT kind, count(*) FROM events GROUP BY 1 ORDER BY 1")
     return {
         "cell": session.meta("cell"),
@@ -34,7 +33,9 @@ def summary_of(session: Session) -> dict[str, Any]:
         "measured": counts.get(("pose", "measured"), 0),
         "open": counts.get(("pose", "open"), 0),
         "complete": not any(outcome == "open" for _, outcome in counts),
-        "skipped": [{"pose": pose + 1, "reason": reason} for pose, reason in skipped],
+        "skipped": skipped["pose"],
+        "skipped_contacts": skipped["registration"],
+        "skipped_checks": skipped["check"],
         "checks": {outcome: counts.get(("check", outcome), 0) for outcome in ("measured", "skipped")},
         "unchecked": unchecked_poses(session),
         "readings": readings,
@@ -51,3 +52,26 @@ def summary_of(session: Session) -> dict[str, Any]:
             (row[0] for row in session.rows("SELECT message FROM events ORDER BY id DESC LIMIT 1")), None
         ),
     }
+
+
+def told_skipped(found: dict[str, Any]) -> list[Notice]:
+    """What is to be known of poses that a summary says were skipped, if there are any."""
+    poses = [each["pose"] for each in found["skipped"]]
+    if not poses:
+        return []
+    return [
+        Notice(
+            "skipped",
+            f"{len(poses)} of {found['poses']} poses were skipped ({list_rows(poses, 'pose')}): truearm "
+            "session show tells why. To measure them, give them as a list of their own and a new session.",
+        )
+    ]
+
+
+def _skipped(session: Session, kind: str) -> list[dict[str, Any]]:
+    """Pose, from 1, and reason of each step of a kind that was skipped."""
+    query = (
+        "SELECT pose, reason FROM outcomes JOIN steps USING (step) "
+        "WHERE kind = ? AND outcome = 'skipped' ORDER BY step"
+    )
+    return [{"pose": pose + 1, "reason": reason} for pose, reason in session.rows(query, (kind,))]

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, war
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
 from truearm.errors import Notice, count_of, list_rows, typed
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, to_si
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,12 +51,13 @@ def command(
     from truearm.cell.poses_file import Poses
     from truearm.cell.rehearsal import rehearse
     from truearm.cell.running import run
-    from truearm.cell.summary import summary_of
+    from truearm.cell.summary import summary_of, told_skipped
 
     known = Cell.load(cell)
     wanted = Poses.read_csv(poses, known.arm)
     warn(_told_at_limits(wanted))
     if dry_run:
+        warn(_told_coarse(known))
         _print_rehearsal(known, rehearse(known, wanted), as_json=as_json)
         if not as_json:
             suggest(f"truearm measure {typed(cell)} {typed(poses)} -o {typed(output)}")
@@ -69,7 +70,7 @@ def command(
     except KeyboardInterrupt:
         tell(f"The session is in {output}; the same command goes on with it.")
         end_at_once()
-    warn(told_unchecked(found["unchecked"]))
+    warn([*told_skipped(found), *told_unchecked(found["unchecked"])])
     if as_json:
         print_json({"end": end, "session": str(output), **found})
         return
@@ -88,6 +89,17 @@ def _told_at_limits(poses: "Poses") -> list[Notice]:
             "anywhere, and the column approach is 0.",
         )
     ]
+
+
+def _told_coarse(cell: "Cell") -> list[Notice]:
+    """Which limits give way to the standard deviation in the section of the sensor, if it has one."""
+    from truearm.cell.scatter import told_coarse
+
+    stated_mm = getattr(cell.sensor_settings, "sigma_mm", None)
+    if not isinstance(stated_mm, int | float) or not stated_mm > 0.0:
+        return []
+    words = told_coarse(to_si(stated_mm, "mm"), cell.file.process)
+    return [Notice("coarse", f"{words[0].upper()}{words[1:]}.")] if words else []
 
 
 def _away(cell: "Cell") -> str:

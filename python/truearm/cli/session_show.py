@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from truearm.cell.session import Session
 
 MOST_SHOWN: Final = 20
+SKIPPED: Final = {
+    "skipped_contacts": "Contact for the frame at pose",
+    "skipped": "Pose",
+    "skipped_checks": "Check at pose",
+}
+"""What a summary lists that was skipped, and what one of it is called."""
 
 
 def command(
@@ -64,8 +70,11 @@ def _show(session: "Session", *, as_json: bool) -> None:
             [_stretch(row) for row in found["stretches"]],
             left=(1,),
         )
-    for skipped in found["skipped"][:MOST_SHOWN]:
-        say_wrapped(f"Pose {skipped['pose']} skipped: {skipped['reason']}")
+    for key, what in SKIPPED.items():
+        for skipped in found[key][:MOST_SHOWN]:
+            say_wrapped(f"{what} {skipped['pose']} skipped: {skipped['reason']}")
+        if len(found[key]) > MOST_SHOWN:
+            say_wrapped(f"{len(found[key]) - MOST_SHOWN} more like these: --json lists them all.")
     _show_end(found)
     if found["measured"]:
         suggest(f"truearm session export {typed(session.path)} -o measurements.csv")

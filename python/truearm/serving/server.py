@@ -19,6 +19,7 @@ from truearm.serving.protocol import (
     read_object,
     read_request,
 )
+from truearm.serving.vanished import probe
 from truearm.streaming import CorrectionStream
 
 DISCARDED_BYTES: Final = 65_536
@@ -34,6 +35,7 @@ class Bounds:
         connections: Connections at once.
         token_s: Time to send the token.
         reading_s: Time to take an answer off the line.
+        vanished_s: Time for which the system of a client may answer nothing, not even a probe.
     """
 
     line_bytes: int = 16_384
@@ -41,6 +43,7 @@ class Bounds:
     connections: int = 16
     token_s: float = 5.0
     reading_s: float = 1.0
+    vanished_s: float = 30.0
 
 
 class Flood:
@@ -116,6 +119,7 @@ class Server:
     async def _answered(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve a connection until it ends, or breaks the rules and is told so."""
         try:
+            probe(writer.get_extra_info("socket"), self._bounds.vanished_s)
             await self._served(reader, writer)
         except (MalformedError, UsageError) as error:
             self._told(f"{_peer(writer)}: {error}; connection closed")

@@ -1,0 +1,53 @@
+"""How far apart points may be by the standard deviations that an instrument states for them."""
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from typing import Final
+
+from truearm.cell.cell_file import ProcessSection
+from truearm.units import MM_PER_METRE, to_si
+
+AS_RARE_AS: Final = 4.0
+"""A distance is explained up to one as rare as a normal value this many standard deviations off."""
+AXES: Final = 3
+
+
+@cache
+def _most() -> float:
+    """Length that three independent normal values of variance 1 exceed as rarely as one of them AS_RARE_AS.
+
+    The square of the length has the chi-squared distribution with three degrees of freedom.
+    """
+    from scipy.special import gammainccinv  # noqa: PLC0415 - slow to import
+
+    rare = math.erfc(AS_RARE_AS / math.sqrt(2.0))
+    return math.sqrt(2.0 * float(gammainccinv(AXES / 2.0, rare)))
+
+
+def explained_m(one_m: float, other_m: float) -> float:
+    """How far apart two points may be, m, of which each coordinate has a standard deviation, m."""
+    return _most() * math.hypot(one_m, other_m)
+
+
+def sigma_of_mean_m(sigmas_m: Sequence[float]) -> float:
+    """Standard deviation of each coordinate, m, of the mean of readings that have these."""
+    return math.fsum(sigmas_m) / len(sigmas_m) / math.sqrt(len(sigmas_m))
+
+
+def told_coarse(sigma_m: float, process: ProcessSection) -> str:
+    """Which limits of a cell file give way to what an instrument states, in words; empty where none does."""
+    mean_m = sigma_of_mean_m([sigma_m] * process.contacts)
+    agree_m, drift_m = explained_m(sigma_m, sigma_m), explained_m(mean_m, mean_m)
+    wider = [
+        f"{what} {MM_PER_METRE * explained:.3g} mm, not {key} = {stated_mm:g}"
+        for what, explained, key, stated_mm in (
+            ("readings of a pose agree within", agree_m, "agree_mm", process.agree_mm),
+            ("the first contact may be off by", drift_m, "drift_mm", process.drift_mm),
+        )
+        if explained > to_si(stated_mm, "mm")
+    ]
+    if not wider:
+        return ""
+    stated = f"the instrument states a standard deviation of {MM_PER_METRE * sigma_m:.3g} mm"
+    return f"{stated}: {', and '.join(wider)}"
