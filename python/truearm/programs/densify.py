@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation import Compensator
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
+from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn

@@ -8,12 +8,13 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation import Compensator, Refusal
+from truearm.compensation import Refusal
 from truearm.controller import Controller
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import make_directory
 from truearm.inverse import Inverse
 from truearm.kinds import check_number, check_positive, check_values, required
+from truearm.programs.corrections import Compensator
 from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets

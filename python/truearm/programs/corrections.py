@@ -1,0 +1,19 @@
+"""What a rewriter asks of whoever corrects readings."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation import Compensated
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+
+class Compensator(Protocol):
+    """What turns readings into corrected ones."""
+
+    def joints(self, q: Floats, *, tool: Floats | None = None, author: Robot | None = None) -> Compensated:
+        """Corrected readings of rows (n, N), at a tool; `author` as in author_of."""
+        ...
