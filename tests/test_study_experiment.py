@@ -17,7 +17,7 @@ from truearm.studies.process import judging, several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
 
-SMALL = ("--regions", "3", "--poses", "12", "--seeds", "2")
+SMALL = ("--regions", "3", "--poses", "16", "--seeds", "2")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_the_experiment_in_small(small):
     figure = result["figure10"]
     errors = {name: part["workspace"]["mean_mm"] for name, part in figure.items()}
     assert errors["variable"] < errors["conventional"] < 0.5 * errors["uncalibrated"]
-    assert result["session"]["measurements"] + result["session"]["skipped"] >= 36
+    assert result["session"]["measurements"] + result["session"]["skipped"] >= 48
     assert {each["place"] for each in result["statements"]} >= {"Fig. 10(a)", "Fig. 10(c, d)"}
     page = (directory / "experiment.md").read_text()
     assert all(each["ours"] in page for each in result["statements"])
