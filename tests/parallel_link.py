@@ -42,5 +42,5 @@ def of_drives(behind_a_link, poses, seed=1, noise_m=NOISE_M):
 
 @cache
 def calibrated(behind_a_link):
-    """A calibration of 150 poses of such an arm."""
-    return ta.calibrate(*of_drives(behind_a_link, 150), seed=1)
+    """A calibration of 120 poses of such an arm."""
+    return ta.calibrate(*of_drives(behind_a_link, 120), seed=1)

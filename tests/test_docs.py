@@ -2,14 +2,17 @@
 
 A fenced block is run when its first line says so: ```python run or ```bash run. The blocks of a page are run
 in order in a directory of their own; Python blocks share their names. Before the first block the directory
-holds measurements.csv and another_day.csv of a virtual UR10. Blocks of TOML and JSON are read. What is
-neither says why: ```bash shown: REASON.
+holds measurements.csv and another_day.csv of a virtual UR10. Commands of truearm that need no shell are run
+in this process, which spares the time of starting others; a calibration that several pages begin with is made
+once. Blocks of TOML and JSON are read. What is neither says why: ```bash shown: REASON.
 """
 
 import importlib.util
 import json
 import os
 import re
+import shlex
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -20,14 +23,15 @@ from pathlib import Path
 import pytest
 
 import truearm as ta
+from tests.in_process import in_this_process
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
 from truearm.cell.session_schema import SCHEMA
-from truearm.cli import COMMANDS
+from truearm.cli import COMMANDS, main
 from truearm.description.robot_file import RobotFile
 from truearm.doubts import of_results as doubts
-from truearm.fleet import Fleet
+from truearm.fleet import Fleet, running
 from truearm.judgement import validation
 from truearm.programs.frames import FramesFile
 from truearm.reporting import advice, gravity, other_data
@@ -45,6 +49,9 @@ PAGES = [
 ]
 FENCE = re.compile(r"^( *)```(\w+) run\n(.*?)^\1```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+COMMAND = re.compile(r"^.*<<'?(\w+)'?\n(?:.*\n)*?\1\n|^(?:.*\\\n)*.*\n", re.MULTILINE)
+OF_A_SHELL = re.compile(r"[|&<>$]")
+PREPARING = re.compile(r"truearm calibrate ur10 measurements\.csv -o (\w+)(?: --model \w+)?")
 TRAINING_POSES, OTHER_POSES = 60, 30
 
 
@@ -69,18 +76,54 @@ def tables():
     }
 
 
+@pytest.fixture(scope="module")
+def prepared(tables, tmp_path_factory):
+    """Makes DIR by `truearm calibrate ur10 measurements.csv -o DIR`, of the same measurements only once."""
+    folder, made = tmp_path_factory.mktemp("prepared"), dict[tuple[str, str], Path]()
+
+    def make(command, directory):
+        kind = command.replace(f" {directory}", ""), Path("measurements.csv").read_text()
+        if kind not in made:
+            run_command(command)
+            made[kind] = shutil.copytree(directory, folder / f"{len(made)}")
+        else:
+            shutil.copytree(made[kind], directory)
+
+    return make
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks_of(page)], ids=name_of)
-def test_examples_run(page, tables, tmp_path, monkeypatch, capsys):
+def test_examples_run(page, tables, prepared, tmp_path, monkeypatch, capsys):
     for name, table in tables.items():
         table.to_csv(tmp_path / name, index=False)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "run_tasks", in_this_process)
     names = {"__name__": "__main__"}
     for language, text in blocks_of(page):
-        if language == "bash":
+        if language == "bash" and "&\n" in text:
             run_bash(text)
+        elif language == "bash":
+            for command in COMMAND.finditer(text):
+                run_one(command[0], prepared)
         else:
             assert language == "python", f"cannot run {language}"
             exec(compile(text, name_of(page), "exec"), names)
+
+
+def run_one(command, prepared):
+    """Run a command of a block where it is quickest."""
+    preparing = PREPARING.fullmatch(command.strip())
+    if preparing:
+        prepared(command, preparing[1])
+    elif command.startswith("truearm ") and not OF_A_SHELL.search(command):
+        run_command(command)
+    else:
+        run_bash(command)
+
+
+def run_command(command):
+    """Run a command of truearm in this process."""
+    assert main(shlex.split(command.replace("\\\n", " "))[1:]) == 0, command
 
 
 def run_bash(text):

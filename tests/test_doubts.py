@@ -178,11 +178,11 @@ def test_of_several_set_ups_the_one_that_lost_a_row_is_named():
     assert "long.csv" not in told
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_single_rows_that_are_far_off_are_not_taken_for_shifted_ones(seed):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
-    table = arm.measure_table(arm.poses(90, seed=seed), seed=seed)
-    off = np.random.default_rng(seed).choice(90, 20, replace=False)
+    table = arm.measure_table(arm.poses(60, seed=seed), seed=seed)
+    off = np.random.default_rng(seed).choice(60, 13, replace=False)
     table.loc[off, ["x", "y"]] += 0.5
     found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), refit=False)
     assert notice_of(found, "rows_shifted") == ""
@@ -359,7 +359,7 @@ def test_single_rows_that_nobody_trusts_say_nothing_of_the_others():
 def test_constants_that_do_better_by_chance_are_not_told():
     constant = Imperfections(share=0.0, noise_mm=0.3)
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=constant)
-    rows = [arm.measure(arm.poses(40, seed=k), seed=k) for k in range(6)]
+    rows = [arm.measure(arm.poses(40, seed=k), seed=k) for k in range(3)]
     found = [ta.calibrate(arm.robot, each, refit=False) for each in rows]
     nearer = 0
     for calibration in found:
@@ -379,7 +379,7 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
     table = arm.measure_table(arm.poses(60))
     found = []
-    for row in range(0, 60, 12):
+    for row in (0, 48):
         wrong = table.assign(x=table["x"] + np.where(table.index == row, 0.9, 0.0))
         calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(wrong), model="constant")
         assert calibration.held is not None
@@ -430,7 +430,7 @@ def test_errors_that_hide_in_noise_are_not_said_to_be_wrong_data(tmp_path, monke
     monkeypatch.chdir(tmp_path)
     noisy = Imperfections(length_mm=0.0, angle_deg=0.0, share=0.0, noise_mm=1.0)
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=noisy)
-    arm.measure_table(arm.poses(200)).to_csv("noisy.csv", index=False)
+    arm.measure_table(arm.poses(100)).to_csv("noisy.csv", index=False)
     assert main(["calibrate", "ur10", "noisy.csv", "-o", "noisy"]) == 0
     told = capsys.readouterr()
     assert "Noise alone would leave" in told.err

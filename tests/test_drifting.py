@@ -19,7 +19,7 @@ from truearm.simulation import VirtualArm
 from truearm.storage.calibration_content import pack, unpack
 
 FAR = np.array([0.12, -0.05, 0.16]) / 1e3
-ROWS = 150
+ROWS = 120
 
 
 def warming(count):
@@ -121,18 +121,18 @@ def test_rows_in_any_order_give_the_same_drift(measured, settled):
 def test_nothing_moves_where_nothing_moved():
     for seed in range(6):
         arm = VirtualArm.paper(seed=seed)
-        calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60 + 30 * seed)), refit=False)
+        calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60 + 20 * seed)), refit=False)
         assert calibration.validation.drift is None
         assert not [notice for notice in calibration.notices if notice.kind == "drift"]
 
 
 def test_a_set_up_that_moved_leaves_the_others_where_they_are():
     arm = VirtualArm.paper(seed=6)
-    both = arm.measure(arm.poses(240))
-    first, second = both.select(np.arange(120)), both.select(np.arange(120, 240))
-    still = replace(first, group=np.full(120, "still"), sources=np.full(120, "still.csv"))
-    warm = replace(moved(second, warming(120)), group=np.full(120, "warm"), sources=np.full(120, "warm.csv"))
-    calibration = ta.calibrate(arm.robot, [still, warm])
+    both = arm.measure(arm.poses(200))
+    first, second = both.select(np.arange(100)), both.select(np.arange(100, 200))
+    still = replace(first, group=np.full(100, "still"), sources=np.full(100, "still.csv"))
+    warm = replace(moved(second, warming(100)), group=np.full(100, "warm"), sources=np.full(100, "warm.csv"))
+    calibration = ta.calibrate(arm.robot, [still, warm], refit=False)
     assert list(drift_of(calibration).moved_mm) == ["warm"]
     rows = rows_of(calibration)
     assert not rows.moved[rows.data.group == "still"].any()
@@ -156,23 +156,24 @@ def named(data, name, first=1):
     return replace(data, rows=rows, sources=sources, group=np.full(count, "cell"))
 
 
-@pytest.mark.parametrize("second", ["b.csv", "a.csv"], ids=["two_files", "two_parts_of_one_name"])
-def test_a_session_in_two_parts_is_one(measured, settled, second):
+@pytest.mark.parametrize(
+    ("second", "seed"), [("b.csv", 0), ("a.csv", 2)], ids=["two_files", "two_parts_of_one_name"]
+)
+def test_a_session_in_two_parts_is_one(measured, second, seed):
     """Also in the report, whatever the seed; the same numbers in parts of one name tell nothing."""
     arm, _, data = measured
     half = ROWS // 2
     parts = named(data.select(np.arange(half)), "a.csv"), named(data.select(np.arange(half, ROWS)), second)
-    for seed in (0, 2):
-        calibration = ta.calibrate(arm.robot, list(parts), seed=seed)
-        rows = rows_of(calibration)
-        order = np.argsort(rows.progress)
-        placed = half * (rows.data.sources[order] != "a.csv") + rows.data.rows[order] - 1
-        if second == "b.csv":
-            assert np.array_equal(placed, np.arange(ROWS))
-        assert rows.data.readings[order] == pytest.approx(data.readings)
-        assert np.corrcoef(rows.moved[order][:, 2], warming(ROWS)[:, 2])[0, 1] > 0.9
-        (says,) = [says for title, says in report(calibration).figures if title.startswith("How the set-up")]
-        assert 10 < int(re.findall(r"first (\d+) of 150 rows", says)[0]) < 50
+    calibration = ta.calibrate(arm.robot, list(parts), seed=seed)
+    rows = rows_of(calibration)
+    order = np.argsort(rows.progress)
+    placed = half * (rows.data.sources[order] != "a.csv") + rows.data.rows[order] - 1
+    if second == "b.csv":
+        assert np.array_equal(placed, np.arange(ROWS))
+    assert rows.data.readings[order] == pytest.approx(data.readings)
+    assert np.corrcoef(rows.moved[order][:, 2], warming(ROWS)[:, 2])[0, 1] > 0.9
+    (says,) = [says for title, says in report(calibration).figures if title.startswith("How the set-up")]
+    assert ROWS / 15 < int(re.findall(rf"first (\d+) of {ROWS} rows", says)[0]) < ROWS / 3
 
 
 def test_rows_that_are_stated_to_be_noisy_hide_nothing(measured, settled):
@@ -261,11 +262,11 @@ def test_a_drift_that_only_the_first_look_shows_is_let_be(measured, monkeypatch)
     assert found == pytest.approx(undisturbed["variable"].position.mean, rel=0.05)
 
 
-@pytest.mark.parametrize("after", [40, 110])
+@pytest.mark.parametrize("after", [32, 88])
 def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
     arm, _, data = measured
     bump = np.outer(np.arange(ROWS) >= after, [0.0, 4e-4, 3e-4])
-    calibration = ta.calibrate(arm.robot, moved(data, bump))
+    calibration = ta.calibrate(arm.robot, moved(data, bump), refit=False)
     left_in = ta.calibrate(arm.robot, moved(data, bump), drift="none", refit=False)
     assert held_mean(calibration) < 0.5 * held_mean(left_in)
     ((jump,),) = drift_of(calibration).jumps.values()
@@ -286,16 +287,17 @@ def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
 def test_an_instrument_that_stood_elsewhere_is_no_slip(measured):
     arm, steady, _ = measured
     turn = Rotation.from_rotvec([0.02, -0.01, 0.5]).as_matrix()
-    elsewhere = np.arange(ROWS)[:, None, None] >= 90
+    elsewhere = np.arange(ROWS)[:, None, None] >= 72
     data = replace(
         steady, targets=np.where(elsewhere, steady.targets @ turn.T + [2.0, -1.0, 0.1], steady.targets)
     )
-    calibration = ta.calibrate(arm.robot, data)
+    calibration = ta.calibrate(arm.robot, data, refit=False)
     ((jump,),) = drift_of(calibration).other_places.values()
     (notice,) = [notice for notice in calibration.notices if notice.kind == "another_place"]
     assert jump.between in str(notice)
     assert "column `group`" in str(notice)
-    assert "row 91" in jump.between
+    before, behind = (int(row) for row in re.findall(r"row (\d+)", jump.between))
+    assert before <= 72 < behind <= before + 4
     advice = report(calibration).advice
     assert jump.between in advice[0].words
     assert "gave_way" not in {each.kind for each in advice}
@@ -322,7 +324,7 @@ def test_the_command_line_finds_it_or_leaves_it_in(tmp_path, monkeypatch, capsys
     table.to_csv("m.csv", index=False)
 
     def calibrated(*more):
-        status = main(["calibrate", "rv-m2", "m.csv", "-o", "out", *more])
+        status = main(["calibrate", "rv-m2", "m.csv", "-o", "out", "--no-refit", *more])
         out, err = capsys.readouterr()
         return status, out, " ".join(err.split())
 
@@ -344,8 +346,8 @@ def test_the_report_shows_how_the_set_up_moved(settled):
     told = {advice.kind: advice.words for advice in made.advice}
     assert "moved by 0.1" in told["warm_up"]
     (says,) = [says for title, says in made.figures if title.startswith("How the set-up moved")]
-    first = int(re.findall(r"first (\d+) of 150 rows", says)[0])
-    assert 10 < first < 50, "half of it took an eighth of the session"
+    first = int(re.findall(rf"first (\d+) of {ROWS} rows", says)[0])
+    assert ROWS / 15 < first < ROWS / 3, "half of it took an eighth of the session"
     assert drift_of(settled).words in words_of(made.html)
     without = report(settled.without_rows())
     assert not [title for title, _ in without.figures if title.startswith("How the set-up moved")]

@@ -12,7 +12,7 @@ from truearm.reporting.parts import Table
 from truearm.reporting.provenance import provenance
 from truearm.simulation import VirtualArm
 
-ROWS = 80
+ROWS = 64
 POINT = ["x", "y", "z"]
 BENDING = {10: 11, 11: 10, 40: 41, 41: 40}
 

@@ -35,7 +35,7 @@ def measured(arm, count, seed, payload_kg):
 
 @pytest.fixture(scope="module")
 def known(arm):
-    data = measured(arm, 80, 0, np.tile([0.0, 4.0, 6.0, 8.0], 20))
+    data = measured(arm, 60, 0, np.tile([0.0, 4.0, 6.0, 8.0], 15))
     return ta.calibrate(arm.robot, data, features=("payload_kg",), refit=False)
 
 

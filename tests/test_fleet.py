@@ -15,9 +15,10 @@ import pytest
 from distributed import LocalCluster
 
 import truearm as ta
+from tests.in_process import in_this_process
 from tests.report_support import figures_of
 from truearm.errors import InputError, UsageError
-from truearm.fleet import Fleet, run_fleet
+from truearm.fleet import Fleet, run_fleet, running
 from truearm.fleet.attention import Reason, order, reasons
 from truearm.fleet.drift import MOVED, drift_of
 from truearm.fleet.fleet_file import LimitsSection
@@ -46,6 +47,14 @@ def arms(*names, **more):
 def table(seed, day):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=seed, imperfections=STEADY)
     return arm.measure_table(arm.poses(POSES, seed=day), seed=day)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def without_workers():
+    """Arms are calibrated in this process, but for those that a cluster is asked for."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running, "run_tasks", in_this_process)
+        yield
 
 
 @pytest.fixture(scope="module")

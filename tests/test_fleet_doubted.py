@@ -5,10 +5,11 @@ from dataclasses import replace
 import pytest
 
 import truearm as ta
+from tests.in_process import in_this_process
 from truearm.doubts.held_tool import never_turns_freely
 from truearm.doubts.of_calibration import OPEN_SETUP
 from truearm.errors import Notice
-from truearm.fleet import Fleet, run_fleet
+from truearm.fleet import Fleet, run_fleet, running
 from truearm.fleet.doubted import grave_notices
 from truearm.simulation import VirtualArm
 
@@ -44,7 +45,9 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(folder):
-    run = run_fleet(Fleet.from_toml(FLEET, folder=folder), folder / "out", workers=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running, "run_tasks", in_this_process)
+        run = run_fleet(Fleet.from_toml(FLEET, folder=folder), folder / "out", workers=1)
     return {arm.row["arm"]: arm for arm in run.arms}
 
 

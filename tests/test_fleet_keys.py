@@ -3,8 +3,9 @@
 import pytest
 
 import truearm as ta
+from tests.in_process import in_this_process
 from truearm.errors import InputError
-from truearm.fleet import Fleet, run_fleet
+from truearm.fleet import Fleet, run_fleet, running
 from truearm.fleet.keys import in_keys
 from truearm.simulation import VirtualArm
 
@@ -27,7 +28,8 @@ def test_options_become_keys(option, key):
     assert in_keys(option) == key
 
 
-def test_what_an_arm_fails_with_names_keys(tmp_path):
+def test_what_an_arm_fails_with_names_keys(tmp_path, monkeypatch):
+    monkeypatch.setattr(running, "run_tasks", in_this_process)
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
     table = arm.measure_table(arm.poses(40))
     table[["x", "y", "z"]] *= 1000.0

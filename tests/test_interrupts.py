@@ -9,7 +9,7 @@ import pytest
 
 from truearm.interrupts import Asked, asked_by
 
-ROUNDS = 50
+ROUNDS = 20
 ENDS_WITHIN_S = 120.0
 # A process of its own sends them, so that one comes while another is handled. Outside of the rounds both are
 # ignored.

@@ -15,9 +15,9 @@ from truearm.simulation import Imperfections, VirtualArm
 
 def test_outliers_are_listed_and_kept_in_the_held_out_errors():
     arm = VirtualArm.paper(seed=2)
-    table = arm.measure_table(arm.poses(120))
-    order = np.random.default_rng(7).permutation(120)
-    trained, held = order[3], order[100]
+    table = arm.measure_table(arm.poses(80))
+    order = np.random.default_rng(7).permutation(80)
+    trained, held = order[3], order[70]
     table.loc[[trained, held], "x"] += 0.02
     calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
     assert {entry["row"] for entry in calibration.summary["outliers"][:2]} == {trained + 1, held + 1}
@@ -49,15 +49,15 @@ def test_outliers_leave_nothing_behind_of_what_was_found_with_them():
 def test_one_row_far_out_spoils_no_model():
     """A wrong decimal point, readings of the row before: neither constants nor what varies remember it."""
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
-    table = arm.measure_table(arm.poses(100))
-    trained = int(np.random.default_rng(7).permutation(100)[3])
+    table = arm.measure_table(arm.poses(90))
+    trained = int(np.random.default_rng(7).permutation(90)[3])
     far, stale = table.copy(), table.copy()
     far.loc[[trained], "x"] += 1.0
     readings = [name for name in table.columns if name.startswith("q")]
-    stale.loc[[trained], readings] = table.loc[[(trained + 1) % 100], readings].to_numpy()
+    stale.loc[[trained], readings] = table.loc[[(trained + 1) % 90], readings].to_numpy()
     found = []
     for each in (table.drop(index=trained), far, stale):
-        calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(each))
+        calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(each), refit=False)
         holdout = calibration.validation.holdout
         means = [holdout[model].position.mean for model in ("nominal", "constant", "variable")]
         found.append([*means, calibration.summary["noise_mm"]])
@@ -118,7 +118,7 @@ def test_an_outlier_by_its_orientation_is_told_with_its_turn(tmp_path, monkeypat
 def test_of_the_outliers_the_advice_has_the_largest_distance():
     """The row with the worst score need not be the farthest: far out a joint scatters more."""
     arm = VirtualArm.paper(seed=2)
-    table = arm.measure_table(arm.poses(90))
+    table = arm.measure_table(arm.poses(60))
     for row, shift in ((11, 0.02), (30, 0.03), (52, 0.05)):
         table.loc[[row], "x"] += shift
     calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))

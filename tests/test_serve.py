@@ -202,7 +202,7 @@ def test_what_is_malformed_costs_the_connection_and_nothing_else(port, line, wor
 def test_features_may_change(tmp_path):
     robot = ta.Robot.load("ur5e")
     arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
-    q = arm.poses(80)
+    q = arm.poses(50)
     mass = np.random.default_rng(1).uniform(0.0, 5.0, len(q))
     table = arm.measure_table(q).assign(payload_kg=mass)
     table["z"] -= 1e-4 * mass

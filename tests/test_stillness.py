@@ -81,7 +81,7 @@ def test_one_held_out_row_is_enough_for_a_report(tmp_path, monkeypatch):
 
 def test_an_outlier_at_the_second_target_is_told_with_its_distance():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
-    q = arm.poses(80)
+    q = arm.poses(50)
     first, second = (arm.measure(q, seed=seed, orientation=True) for seed in (0, 1))
     assert second.orientations is not None
     turned = matrix_from_quaternion(second.orientations) @ np.array([0.1, 0.0, 0.05])

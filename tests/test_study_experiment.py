@@ -3,12 +3,12 @@
 import io
 import json
 from contextlib import redirect_stdout
-from importlib.metadata import version
 
 import numpy as np
 import pytest
 from distributed import LocalCluster
 
+from tests.in_process import in_this_process
 from truearm.cell.session import Session
 from truearm.cli import main
 from truearm.errors import InputError, WorkError
@@ -16,7 +16,6 @@ from truearm.stages import no_stages
 from truearm.studies.process import judging, several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
-from truearm.workers.done import answer
 
 SMALL = ("--regions", "3", "--poses", "16", "--seeds", "2")
 
@@ -112,11 +111,6 @@ def test_an_arm_that_fails_is_named_and_stops_none_of_the_others(tmp_path, monke
     with pytest.raises(WorkError, match=r"^arm 2, session\.db: nothing was measured"):
         several.conduct_arms(settings, tmp_path, lambda _: None, no_stages)
     assert asked == [1, 2, 3]
-
-
-def in_this_process(function, items, **_):
-    for number, item in enumerate(items):
-        yield answer(function, item, version("truearm")).of(number)
 
 
 def test_a_worker_that_does_not_see_the_directory_measures_nothing(tmp_path, monkeypatch):
