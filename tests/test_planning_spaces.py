@@ -21,6 +21,7 @@ from truearm.planning.accessibility import (
     KeepOut,
     LeastContactAngle,
     Places,
+    Rule,
     accessible,
     either,
     lowest,
@@ -231,7 +232,7 @@ def test_a_users_own_rule_and_its_shape():
 
 def test_poses_to_judge_may_be_a_list_or_a_table():
     readings = np.random.default_rng(6).uniform(-1.0, 1.0, (20, 5))
-    rules = [AboveFloor(0.3), KeepOut((0.1, 0.1, 0.0), (0.2, 0.3, 0.5))]
+    rules: list[Rule] = [AboveFloor(0.3), KeepOut((0.1, 0.1, 0.0), (0.2, 0.3, 0.5))]
     allowed = accessible(RV_M2, readings, rules)
     for given_so in (readings.tolist(), pd.DataFrame(readings)):
         np.testing.assert_array_equal(accessible(RV_M2, given_so, rules), allowed)

@@ -56,10 +56,10 @@ def test_that_joint_is_said_to_matter_most_whose_corrections_move_the_tool_most(
 def test_a_pose_that_was_measured_several_times_is_one_line_of_the_largest_corrections(facts):
     made = facts.waypoints
     (table,) = largest(facts, made.data, made.found)
-    named = [made.data.rows.tolist().index(int(row[0])) for row in table.rows]
+    named = [made.data.rows.tolist().index(int(str(row[0]))) for row in table.rows]
     assert len(np.unique(made.data.readings[named], axis=0)) == len(named) == 6
     assert "Of rows of one pose" in table.says
-    assert [part.split()[1] for part in table.rows[0][4].split(", ")] == ["deg", "deg", "mm", "deg"]
+    assert [part.split()[1] for part in str(table.rows[0][4]).split(", ")] == ["deg", "deg", "mm", "deg"]
 
 
 def test_a_sliding_joint_is_said_to_have_no_constant_and_no_standard_deviation_of_the_whole(facts):
@@ -68,5 +68,5 @@ def test_a_sliding_joint_is_said_to_have_no_constant_and_no_standard_deviation_o
     at = {name: list(table.columns).index(name) for name in ("constant part", "standard deviation")}
     assert [rows["d3"][at[name]] for name in at] == ["none", ""]
     assert rows["theta4"][at["constant part"]] == "nominal"
-    assert float(rows["a2"][at["standard deviation"]]) > 0.0
+    assert float(str(rows["a2"][at["standard deviation"]])) > 0.0
     assert "it has no constant (none)" in table.says
