@@ -212,7 +212,7 @@ pub fn contiguous<'a, T: Element, D: Dimension>(
 
 pub fn not_contiguous(name: &str) -> PyErr {
     CoreError::new_err(format!(
-        "{name} is not C-contiguous and aligned: pass numpy.ascontiguousarray({name})"
+        "{name} is not C-contiguous and aligned: pass numpy.require({name}, requirements=[\"C\", \"A\"])"
     ))
 }
 
