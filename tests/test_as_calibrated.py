@@ -1,5 +1,7 @@
 """Arms that are not as they were calibrated, on measurements of another day."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import truearm as ta
 from tests.remastered import remastered_table
 from truearm.cli import main
 from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
+from truearm.doubts.of_results import NO_HELP
 from truearm.frame_share import FRAME_UNCERTAIN
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
@@ -84,6 +87,29 @@ def test_an_update_is_proposed_in_place_of_compensation(known, tmp_path, monkeyp
     line = next(line for line in told.out.splitlines() if "truearm update" in line)
     assert main(line.split()[1:]) == 0
     assert "Offsets or tool changed." in capsys.readouterr().out
+
+
+def test_an_arm_whose_calibration_was_good_is_changed_also_where_it_is_of_no_use_now(known):
+    arm, calibration = known
+    far = ta.Measurements.from_dataframe(later(arm, 24.0 * SHIFT_DEG))
+    (said,) = ta.evaluate(calibration, far).notices
+    assert said.kind == NOT_AS_CALIBRATED
+    assert "Do not use it as it is" in str(said)
+    assert "truearm update" in str(said)
+    holdout = {**calibration.validation.holdout, "nominal": calibration.validation.holdout["variable"]}
+    unproven = replace(calibration, validation=replace(calibration.validation, holdout=holdout))
+    assert kinds(ta.evaluate(unproven, far)) == [NO_HELP]
+
+
+def test_a_gross_row_that_was_held_out_hides_no_change(known):
+    arm, calibration = known
+    data, held = arm.measure(arm.poses(60)), calibration.held
+    assert held is not None
+    targets = data.targets.copy()
+    targets[held.rows[0] - 1] = 0.0
+    spoilt = ta.calibrate(arm.robot, replace(data, targets=targets))
+    found = ta.evaluate(spoilt, ta.Measurements.from_dataframe(later(arm, SHIFT_DEG)))
+    assert kinds(found) == [NOT_AS_CALIBRATED]
 
 
 def test_a_report_does_not_begin_with_what_was_reached_on_another_day(known):

@@ -12,7 +12,7 @@ from truearm._core import ANGLE_ARM_M, Setup
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts.admitted import admitted
-from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
+from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, changed_since, not_as_calibrated
 from truearm.doubts.gross_rows import (
     FAR_ROWS,
     Expected,
@@ -41,7 +41,7 @@ from truearm.judgement.judging import (
     where_found,
     without_parts,
 )
-from truearm.judgement.validation import Errors, RowErrors, means_in_words
+from truearm.judgement.validation import Errors, means_in_words
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.registration import register
@@ -49,7 +49,6 @@ from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
-from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -190,9 +189,9 @@ def evaluate(
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
         spoiled, doubts, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
-    of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration)) or changed
+    of_no_use = spoiled or _of_no_use(calibration, held, changed) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
-        of_no_use = _moved(calibration, given, chosen, errors[best]) or of_no_use
+        of_no_use = _moved(calibration, given, chosen, held.median_mm(best)) or of_no_use
     notices = [*notices, *of_no_use, *doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
@@ -267,15 +266,16 @@ def _setup(
     return fit_setup(task, data, parameters).setup
 
 
-def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
-    """A warning where the calibration does not help; medians, since single rows may be wrong."""
-    before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
+def _of_no_use(calibration: Calibration, held: HeldRows, changed: list[Notice]) -> list[Notice]:
+    """A warning where the calibration does not help, with what was `changed` if it did before."""
+    best, floor_mm = calibration.model_name, distance_at_floor_mm(calibration)
     what = "median error on the rows that were judged"
-    return no_help(before, after, what, floor_mm, best=best)
+    told = no_help(held.median_mm(NOMINAL), held.median_mm(best), what, floor_mm, best=best)
+    return told and (changed_since(calibration, changed, held) or told)
 
 
 def _moved(
-    calibration: Calibration, data: Measurements, options: EvaluationOptions, kept: RowErrors
+    calibration: Calibration, data: Measurements, options: EvaluationOptions, kept_mm: float
 ) -> list[Notice]:
     """A warning that the instrument or the tool is elsewhere, where the calibration fits with both found
     anew, or misses far less; with it, if so, that the arm is not as it was either. None where neither can be
@@ -289,19 +289,17 @@ def _moved(
     known_mm, misses = known_mean_mm(calibration), {notice.kind for notice in anew.notices}
     if anew.rows is None or known_mm is None or {NO_HELP, FAR_ROWS} & misses:
         return []
-    before, after = (
-        MM_PER_METRE * float(np.nanmedian(errors.distance_m)) for errors in (kept, anew.rows.errors[best])
-    )
-    fits = NOT_AS_CALIBRATED not in misses and after <= AS_KNOWN * known_mm
-    if after > (1.0 if fits else ELSEWHERE) * before:
+    after_mm = anew.rows.median_mm(best)
+    fits = NOT_AS_CALIBRATED not in misses and after_mm <= AS_KNOWN * known_mm
+    if after_mm > (1.0 if fits else ELSEWHERE) * kept_mm:
         return []
     given = {"--keep-frames": options.keep_frames, "--keep-tool": options.keep_tool}
     with_frame = options.keep_frames and not calibration.arm.world_is_known
     what = "frame and tool" if with_frame else "tool"
     where = "instrument or the target stands" if with_frame else "target sits"
     text = (
-        f"With the {what} of the calibration the median error is {length_mm(before, 4)}, with what can be "
-        f"found anew {length_mm(after, 4)}: the {where} elsewhere than then"
+        f"With the {what} of the calibration the median error is {length_mm(kept_mm, 4)}, with what can be "
+        f"found anew {length_mm(after_mm, 4)}: the {where} elsewhere than then"
         f"{', and the calibration itself fits' if fits else ''}. "
         f"Leave {' and '.join(option for option, is_given in given.items() if is_given)} out."
     )

@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 from truearm.calibration import Calibration
 from truearm.doubts.gross_rows import AXES, Expected, widened
 from truearm.doubts.nominal_misfit import some_rows
-from truearm.doubts.outliers import Outliers, known_mean_mm
+from truearm.doubts.of_results import helps
+from truearm.doubts.outliers import Outliers, known_mean_mm, own_means_mm
+from truearm.doubts.what_to_check import OF_FILE
 from truearm.errors import Notice
+from truearm.fits.models import NOMINAL
 from truearm.judgement.held_rows import HeldRows
 from truearm.lengths import length_mm
 from truearm.units import MM_PER_METRE
@@ -24,6 +27,8 @@ of either."""
 WITHIN_95: Final = float(np.sqrt(7.815 / AXES))
 """Times its root mean square that 95 of 100 lengths of three normal coordinates are within."""
 HALF: Final = 0.5
+TURNED_RAD: Final = 0.2
+"""No joint is mastered anew by so much: errors beyond that part of how far the flange gets are of a file."""
 MOST_ROWS: Final = 200
 """Rows at the most that are compared with what was expected there."""
 
@@ -57,6 +62,34 @@ def not_as_calibrated(
         f"mean error{here} is {length_mm(mean_mm, 4)}, {length_mm(known_mm, 4)} on the calibration's own "
         f"held-out rows{there}, and {100.0 * share:.0f} % of the rows are farther off than its standard "
         "deviations and noise allow 5 % to be."
+    )
+    return [Notice(NOT_AS_CALIBRATED, text)]
+
+
+def changed_since(calibration: Calibration, changed: list[Notice], held: HeldRows) -> list[Notice]:
+    """What was `changed`, where a calibration is of no use that was of use on its own held-out rows.
+
+    These prove the robot and its convention: what is wrong is the new file, or was changed since. Errors
+    that no joint leaves which is mastered anew are those of a wrong file.
+
+    Args:
+        calibration: The calibration.
+        changed: What not_as_calibrated says, if anything.
+        held: The judged rows with their errors.
+    """
+    known, best, robot = own_means_mm(calibration), calibration.model_name, calibration.robot
+    flange = robot.flange_chain.position(robot.joints_from_readings(held.readings))
+    reach_mm = MM_PER_METRE * float(np.sqrt(flange.var(axis=0).sum()))
+    is_proven = helps(known[NOMINAL], known[best])
+    if not changed or not is_proven or held.median_mm(best) > TURNED_RAD * reach_mm:
+        return []
+    nominal, own = (length_mm(held.median_mm(name), 4) for name in (NOMINAL, best))
+    tells = ": truearm update tells which" if can_be_updated(calibration) else ""
+    text = (
+        f"{changed[0]} Do not use it as it is: its median error is {own}, that of the nominal model "
+        f"{nominal}. On its own held-out rows it helped, so robot and convention are right. If this file is "
+        "as theirs was, joints were mastered anew, or the tool or another part was changed"
+        f"{tells}. If it is not, check {OF_FILE}."
     )
     return [Notice(NOT_AS_CALIBRATED, text)]
 

@@ -10,6 +10,7 @@ from truearm.doubts.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.doubts.grids import BETWEEN, grid_steps, grid_words
 from truearm.doubts.held_tool import TURN_MORE, held_tool, held_words
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
+from truearm.doubts.what_to_check import CHECKS
 from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection
 from truearm.fits.details import ANOTHER_PLACE, VariableDetails
@@ -82,12 +83,6 @@ FEW_VALUES: Final = "few_values"
 HELD_TOOL: Final = "held_tool"
 HIDING: Final = (FEW_VALUES, HELD_TOOL)
 """What leaves a part of the errors out of held-out poses too; grids do as well."""
-CHECKS: Final = (
-    "Check that readings and points belong together row by row, the order of the columns, units, a device "
-    "frame that is right-handed, the robot, and in its file the convention, the signs of d, a and alpha, "
-    "the direction of each joint (direction = -1), its zero (theta) and whether joint 3 is counted against "
-    "link 2 or against the horizontal ([coupling]). Rows of different stations need a column group"
-)
 
 
 def doubts(

@@ -69,6 +69,11 @@ def judged_means_mm(validation: Validation, outliers: Outliers) -> dict[str, flo
     return {name: found.position.mean for name, found in validation.holdout.items()}
 
 
+def own_means_mm(calibration: "Calibration") -> dict[str, float]:
+    """Mean errors of a calibration's models on its own held-out rows, without the outliers that it knows."""
+    return judged_means_mm(calibration.validation, Outliers.of(calibration))
+
+
 def known_mean_mm(calibration: "Calibration") -> float | None:
-    """The same of the model of a calibration that predicts; None where nothing was judged."""
-    return judged_means_mm(calibration.validation, Outliers.of(calibration)).get(calibration.model_name)
+    """The mean error of the model that predicts among them; None where nothing was judged."""
+    return own_means_mm(calibration).get(calibration.model_name)

@@ -84,6 +84,10 @@ class HeldRows:
             if k is not None
         ]
 
+    def median_mm(self, model: str) -> float:
+        """Median position error of a model, mm: single rows may be far off."""
+        return float(MM_PER_METRE * np.nanmedian(self.errors[model].distance_m))
+
     def means_without_mm(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
         """Mean position error of each model at the other rows, mm; empty without an outlier here."""
         kept = self.without(outliers)

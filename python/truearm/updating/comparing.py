@@ -31,7 +31,6 @@ from truearm.rows.visits import one_row_a_visit
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
-from truearm.units import MM_PER_METRE
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
@@ -323,7 +322,7 @@ def _missed_mm(calibration: Calibration) -> tuple[float, str]:
     name, held = calibration.model_name, calibration.held
     if held is None:
         return calibration.validation.holdout[name].position.mean, "on average"
-    return MM_PER_METRE * float(np.nanmedian(held.errors[name].distance_m)), "in the median"
+    return held.median_mm(name), "in the median"
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
