@@ -135,6 +135,8 @@ def test_the_files_of_a_fleet_say_the_same(runs, plant):
         assert line["verdict"] == arm["verdict"]
         if arm["status"] == "done":
             assert float(line["mean_mm"]) == arm["mean_mm"]
+            assert line["errors_of"] == arm["errors_of"] == "position"
+            assert arm["drift"]["previous_errors_of"] == "position"
             assert float(line["drift_mean_mm"]) == arm["drift"]["mean_mm"]
     page = (folder / "fleet.html").read_text()
     for words in ("2 of 4 arms are good, 1 needs attention, 1 could not be calibrated.", "R3"):

@@ -1,73 +1,39 @@
 """Fleets with arms whose distances were measured, whose errors are not those of positions."""
 
 import csv
-import json
 from typing import Any
 
-import numpy as np
 import pytest
 
-import truearm as ta
-from tests.test_fleet import DRIFT, ROW
-from truearm.cli import main
+from tests.test_fleet import DRIFT, HEAD, ROW, arms
+from truearm.cli.fleet import COLUMNS, _cells
+from truearm.fits.core_set import Selection
+from truearm.fleet import Fleet
 from truearm.fleet.attention import reasons
-from truearm.fleet.drift import drift_of
 from truearm.fleet.fleet_file import LimitsSection
-from truearm.simulation import Imperfections, VirtualArm
+from truearm.fleet.page import fleet_page
+from truearm.fleet.rows import content, judged, table_of
 
-POSES = 42
-WIRE: dict[str, Any] = {**ROW, "errors_of": "distance"}
-HEAD = """
-[defaults]
-robot = "rv-m2"
-model = "constant"
-report = false
-measurements = "{arm}.csv"
-[[arm]]
-name = "wire"
-[[arm]]
-name = "points"
-"""
+WIRE: dict[str, Any] = {**ROW, "errors_of": Selection((), distances=True).errors_of}
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """One arm, measured by points and by a wire from three anchors."""
-    arm = VirtualArm(ta.Robot.load("rv-m2"), seed=1, imperfections=Imperfections(share=0.0))
-    rows = arm.measure_table(arm.poses(POSES))
-    rows.to_csv(tmp_path / "points.csv", index=False)
-    named = np.arange(POSES) % 3
-    anchors = np.array([[1.8, 0.3, -0.2], [-0.9, 1.5, 0.1], [0.3, -2.0, 0.5]])[named]
-    length = np.linalg.norm(rows[["x", "y", "z"]] - anchors, axis=1)
-    wire = rows.drop(columns=["x", "y", "z"]).assign(distance=length, anchor=np.array(list("abc"))[named])
-    wire.to_csv(tmp_path / "wire.csv", index=False)
-    return tmp_path
-
-
-def test_what_errors_are_of_stands_in_every_table(folder, capsys):
-    (folder / "fleet.toml").write_text(HEAD)
-    assert main(["fleet", str(folder / "fleet.toml"), "-o", str(folder / "out"), "--workers", "1"]) == 0
-    shown = capsys.readouterr().out
+def test_what_errors_are_of_stands_in_every_table():
+    fleet = Fleet.from_toml(HEAD + arms("wire", "points"))
+    both = {"wire": WIRE, "points": ROW}
+    found = judged(fleet, [{**row, "arm": name, "held_out": 30} for name, row in both.items()])
     kinds = {"wire": "distance", "points": "position"}
-    for name, kind in kinds.items():
-        (line,) = (line for line in shown.splitlines() if line.startswith(f" {name} "))
-        assert kind in line
-        assert len(line) <= 80
-    lines = csv.DictReader((folder / "out" / "fleet.csv").read_text().splitlines())
+    at = COLUMNS.index("errors of")
+    assert {cells[0]: cells[at] for cells in map(_cells, found)} == kinds
+    lines = csv.DictReader(table_of(found).splitlines())
     assert {line["arm"]: line["errors_of"] for line in lines} == kinds
-    content = json.loads((folder / "out" / "fleet.json").read_text())
-    assert {arm["arm"]: arm["errors_of"] for arm in content["arms"]} == kinds
-    words = {arm["arm"]: arm["words"] for arm in content["arms"]}
-    assert "the mean distance error is" in words["wire"]
-    assert "the mean position error is" in words["points"]
-    wire, points = (
-        ta.Calibration.load(folder / "out" / name / "calibration.calib") for name in ("wire", "points")
-    )
-    drift = drift_of(wire, points, ta.Measurements.read_csv(folder / "points.csv"))
-    assert drift["previous_errors_of"] == "distance"
-    page = (folder / "out" / "fleet.html").read_text()
-    assert "nominal, distance" in page
-    assert "nominal, position" in page
+    entries = {entry["arm"]: entry for entry in content(fleet, found, "1")["arms"]}
+    for name, kind in kinds.items():
+        assert entries[name]["errors_of"] == kind
+        assert f"the mean {kind} error is 0.100 mm" in entries[name]["words"]
+    page = fleet_page(fleet, found, ())
+    for kind in kinds.values():
+        assert f"nominal, {kind}" in page
+        assert f"The largest {kind} error is that of" in page
 
 
 @pytest.mark.parametrize(
