@@ -221,7 +221,7 @@ def test_threads_are_counted_from_one(variable):
 
 def test_same_bits_whatever_the_number_of_threads():
     arm = VirtualArm.paper(seed=4)
-    data = arm.measure(arm.poses(120))
+    data = arm.measure(arm.poses(80))
     found = [ta.calibrate(arm.robot, data, threads=threads) for threads in (1, 2, 4)]
     q = arm.poses(20, seed=3)
     for other in found[1:]:
@@ -233,7 +233,7 @@ def test_same_bits_whatever_the_number_of_threads():
 
 def test_same_seed_same_calibration(tmp_path):
     arm = VirtualArm.paper(seed=4)
-    data = arm.measure(arm.poses(60))
+    data = arm.measure(arm.poses(40))
     for name in ("first", "second"):
         ta.calibrate(arm.robot, data).save(tmp_path / name)
     assert (tmp_path / "first").read_bytes() == (tmp_path / "second").read_bytes()

@@ -18,7 +18,7 @@ def measured_otherwise(name, **otherwise):
     """An arm that is otherwise than its file says, and what is measured of it."""
     robot, convention = ta.Robot.load(name), Convention(**otherwise)
     arm = VirtualArm(convention.robot(robot), seed=4)
-    table = arm.measure_table(arm.poses(60))
+    table = arm.measure_table(arm.poses(36))
     data = ta.Measurements.from_dataframe(table, joints=robot.joints)
     seen = convention.measured(Seen.of(data, 0))
     return robot, replace(data, readings=seen.readings, targets=seen.points[:, None])
@@ -30,7 +30,6 @@ def measured_otherwise(name, **otherwise):
         ("ur10", {"turned": (0,)}, "if joint 1 is counted the other way (direction = -1 in its link). Put"),
         ("kuka-kr-6-r900", {"turned": (0,)}, "joint 1 is counted the other way (direction = 1 in its link)"),
         ("ur10", {"turned": (2, 4)}, "joint 3 is counted the other way .*, and joint 5 is counted the other"),
-        ("ur10", {"mirrored": True}, "if the device's frame is left-handed"),
         (
             "fanuc-lr-mate-200id",
             {"coupled": 0.0},
@@ -56,9 +55,7 @@ def named_otherwise(name, **otherwise):
 @pytest.mark.parametrize(
     ("name", "zeros", "words"),
     [
-        ("ur10", ((1, 1),), ["2 is elsewhere (theta = 90 deg in its link, and not 0)"]),
         ("ur10", ((1, -1), (2, 1), (3, 2)), ["2 is elsewhere (theta = -90", "3 is", "4 is"]),
-        ("abb-irb-120", ((1, -1), (2, 1)), ["2 is elsewhere (theta = 180 deg", "3 is"]),
         ("kuka-iiwa-7", ((2, -1),), ["3 is elsewhere (theta = -90 deg in its link, and not 0)"]),
         ("franka-panda", ((5, 2),), ["6 is elsewhere (theta = 180 deg in its link, and not 0)"]),
     ],
@@ -83,14 +80,8 @@ def test_zeros_that_are_elsewhere_are_named(name, zeros, words):
             "d of link 4 has the other sign (d = -302 mm, and not 302",
         ),
         ("abb-irb-120", {"signs": ((2, ALPHA),)}, "alpha of link 3 has the other sign (alpha = 90 deg, and"),
-        (
-            "kuka-kr-6-r900",
-            {"signs": ((0, A),)},
-            "a of link 1 has the other sign (a = -25 mm, and not 25",
-        ),
         ("kuka-iiwa-7", {"signs": ((2, D), (4, D))}, "d of link 3 has the other sign (d = -400 mm, and not"),
         ("abb-irb-120", {"exchanged": (3, 4)}, "if the columns of joints 4 and 5 are exchanged. Put"),
-        ("kuka-iiwa-7", {"exchanged": (0, 1)}, "if the columns of joints 1 and 2 are exchanged. Put"),
     ],
 )
 def test_what_is_written_otherwise_in_rows_and_columns_is_named(name, otherwise, words):
@@ -99,7 +90,7 @@ def test_what_is_written_otherwise_in_rows_and_columns_is_named(name, otherwise,
     assert "link 7 has the other sign" not in told, "the target takes that over"
 
 
-@pytest.mark.parametrize("name", ["ur10", "abb-irb-120", "kuka-iiwa-7"])
+@pytest.mark.parametrize("name", ["ur10", "abb-irb-120"])
 def test_a_zero_and_a_direction_that_nobody_can_tell_apart_are_both_named(name):
     told, _, others = named_otherwise(name, zeros=((1, 2),)).partition(" They fit as well if ")
     assert "if joint 1 is counted the other way" in told
@@ -113,8 +104,15 @@ def test_a_zero_and_a_direction_are_named_together():
     assert "the zero of joint 2 is elsewhere (theta = -90 deg" in told
 
 
-@pytest.mark.parametrize("name", ["ur10", "abb-irb-120"])
-@pytest.mark.parametrize("turned", [(3, 5), (1, 3, 4), (0, 1, 3, 5)])
+@pytest.mark.parametrize(
+    ("name", "turned"),
+    [
+        ("ur10", (3, 5)),
+        ("ur10", (0, 1, 3, 5)),
+        ("abb-irb-120", (1, 3, 4)),
+        ("abb-irb-120", (0, 1, 3, 5)),
+    ],
+)
 def test_joints_counted_otherwise_are_not_put_down_to_a_left_handed_frame(name, turned):
     told, _, others = named_otherwise(name, turned=turned).partition(" They fit as well if ")
     named = [int(joint) - 1 for joint in re.findall(r"joint (\d) is counted the other way", told)]
@@ -132,7 +130,7 @@ def test_of_joints_that_fit_as_well_the_fewest_are_named():
 
 @pytest.mark.parametrize(
     ("name", "mirror_image"),
-    [("ur10", []), ("abb-irb-120", ["1", "4", "6"]), ("kuka-kr-6-r900", ["1", "4", "6"])],
+    [("ur10", []), ("abb-irb-120", ["1", "4", "6"])],
 )
 def test_a_left_handed_frame_is_told_with_the_joints_that_look_like_it(name, mirror_image):
     told, _, others = named_otherwise(name, mirrored=True).partition(" They fit as well if ")

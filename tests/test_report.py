@@ -289,7 +289,7 @@ def test_compensation_uses_what_varies_where_it_takes_the_model(reports):
 @pytest.mark.parametrize(("step_deg", "wanted"), [(10.0, "between_the_grid"), (0.01, "noise_floor")])
 def test_on_a_grid_the_noise_floor_is_not_said_to_be_reached(step_deg, wanted):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(share=0.0, noise_mm=0.05))
-    readings = np.radians(step_deg * np.round(np.degrees(arm.poses(150)) / step_deg))
+    readings = np.radians(step_deg * np.round(np.degrees(arm.poses(100)) / step_deg))
     found = ta.calibrate(arm.robot, arm.measure(readings), use="position", refit=False)
     for calibration in (found, found.without_rows()):
         told = {advice.kind: advice.words for advice in report(calibration).advice}

@@ -63,7 +63,7 @@ def test_what_varies_with_a_feature_is_told(warmed):
 
 def test_noise_of_several_targets_is_said_to_be_of_all(tmp_path, monkeypatch, capsys):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
-    q = arm.poses(60)
+    q = arm.poses(40)
     table = arm.measure_table(q)
     arm.target_in_flange = np.add(arm.target_in_flange, [0.1, 0.0, 0.0])
     table[["x2", "y2", "z2"]] = arm.measure_table(q)[["x", "y", "z"]].to_numpy()

@@ -82,7 +82,7 @@ def load(tmp_path: Path, chain: Chain) -> Robot:
     return Robot.from_urdf(path)
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(chain=st.lists(joints, min_size=1, max_size=8), seed=st.integers(0, 2**32 - 1))
 def test_any_chain_keeps_its_forward_kinematics(tmp_path: Path, chain: Chain, seed: int) -> None:
     chain = [

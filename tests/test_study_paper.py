@@ -18,7 +18,7 @@ from truearm.studies.paper_results import PaperStudy, conduct_study, save_pictur
 from truearm.studies.statements import STATEMENTS, checked
 
 SCHEMES = {"uncalibrated", "conventional", "regional", "fcmac", "fcmac_shrunk", "variable"}
-FEW_POSES = 400
+FEW_POSES = 200
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def study():
     """One seed of every figure, with few regions so that it is quick."""
     patch = pytest.MonkeyPatch()
     patch.setattr(paper, "JOINT_REGIONS", 16)
-    patch.setattr(paper, "SPHERE_REGIONS", 8)
+    patch.setattr(paper, "SPHERE_REGIONS", 4)
     patch.setattr(paper, "READINGS", setting.READINGS[::2])
     patch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
     yield conduct_study([0], PAPER_FIGURES)

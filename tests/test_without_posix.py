@@ -14,6 +14,9 @@ from truearm.simulation import VirtualArm
 
 RUNNER = str(Path(__file__).parent / "without_posix.py")
 FLEET = """
+[defaults]
+model = "constant"
+report = false
 [[arm]]
 name = "first"
 robot = "ur5e"
