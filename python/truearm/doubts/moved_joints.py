@@ -197,10 +197,11 @@ def _while_measured(told: list[Moved]) -> Notice:
     also = ", or note its temperature in a column and calibrate with --features."
     if named:
         names = " and ".join(moved.column.name for moved in named)
-        go, which = ("go", "NAME") if len(named) > 1 else ("goes", names)
+        several = len(named) > 1
+        go, it, which = ("go", "one of them", "NAME") if several else ("goes", "it", names)
         also = (
             f". {names} {go} one way meanwhile, as the time does, and these rows do not tell them apart: if "
-            f"it is what moves the joints, and {KNOWN}, calibrate with --features {which}{_to_fill(named)}."
+            f"{it} is what moves the joints, and {KNOWN}, calibrate with --features {which}{_to_fill(named)}."
         )
     text = (
         "The joints moved while they were measured, whatever the pose, as those of an arm that warms up: "
