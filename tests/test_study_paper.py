@@ -2,6 +2,7 @@
 
 import json
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,6 +109,18 @@ def test_pictures_are_written_for_print(study, tmp_path):
     again = (tmp_path / "figure8.svg").read_bytes()
     save_panels({"figure8": study.drawn["figure8"]}, tmp_path)
     assert (tmp_path / "figure8.svg").read_bytes() == again
+
+
+def test_points_that_were_not_reached_leave_gaps_in_pictures(study, tmp_path):
+    drawn = study.drawn["figure6"]
+    lost = {}
+    for name, found in drawn.traces.items():
+        errors_mm = found.errors_mm.copy()
+        errors_mm[:3] = np.nan
+        lost[name] = replace(found, errors_mm=errors_mm)
+    (png, svg) = save_panels({"figure6": replace(drawn, traces=lost)}, tmp_path)
+    assert png.stat().st_size > 0
+    assert svg.stat().st_size > 0
 
 
 def test_the_path_of_figure_7_is_within_reach():

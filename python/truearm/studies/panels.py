@@ -84,7 +84,8 @@ def _panels(drawn: Drawn, names: Sequence[str]) -> Figure:
         found = drawn.traces[name]
         left, right = axes[row]
         left.plot(found.size_mm, color="black")
-        left.set_ylim(0.0, 1.15 * float(found.size_mm.max()))
+        # Points that were not reached leave gaps.
+        left.set_ylim(0.0, 1.15 * max(float(np.nanmax(found.size_mm, initial=0.0)), LEAST_SPAN["mm"]))
         left.set_ylabel("position error, mm")
         left.set_title(f"({ascii_lowercase[row]}) {TITLES[name]}", loc="left")
         if name == "uncalibrated":
