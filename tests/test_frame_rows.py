@@ -39,7 +39,7 @@ def test_shots_of_a_pose_are_on_one_side(known, cycles):
     assert (found.n_judged, found.n_judged_poses) == (24, 4)
     assert repr(found).startswith("<Evaluation: frame of 6 poses (36 rows), 4 poses (24 rows) judged; ")
     assert found.errors["constant"].position.mean > 1.0
-    assert "no_help" in {notice.kind for notice in found.notices}
+    assert "not_as_calibrated" in {notice.kind for notice in found.notices}
     assert ta.evaluate(calibration, data, frame_rows=25).n_frame == 30
     with pytest.raises(
         ta.InputError, match=r"9 measured values in 3 frame poses \(18 rows\).*--frame-rows 24"
