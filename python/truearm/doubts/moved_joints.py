@@ -31,8 +31,6 @@ OVERWHELMING: Final = 1e-6
 """Chance explains as much in less than so many calibrations, however many columns are asked."""
 ORDER: Final = ""
 """Name of the order of the rows among the columns."""
-
-
 MOSTLY: Final = 0.5
 """Share of the steps from visit to visit at which what goes with the time changes."""
 EVEN: Final = 1e-4

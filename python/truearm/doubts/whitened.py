@@ -63,9 +63,8 @@ class Visits:
         each = fitted.residual[order, : held.shape[1]] * held
         shots = means(held.astype(np.float64), visits) * np.bincount(visits)[:, None]
         residual = means(each, visits) * np.bincount(visits)[:, None] / np.maximum(shots, 1.0)
-        sigma = fitted.data.sigma_m
-        own_sigma = np.zeros(len(order)) if sigma is None else np.nan_to_num(sigma[order])
-        stated, further = means(np.square(own_sigma), visits), np.bincount(visits) - 1.0
+        stated = means(np.square(fitted.data.stated_sigma_m[order]), visits)
+        further = np.bincount(visits) - 1.0
         own = Scatter.of(np.where(held, each, np.nan), visits).own
         own -= float(np.average(stated, weights=further)) if further.any() else 0.0
         _, first = np.unique(visits, return_index=True)
