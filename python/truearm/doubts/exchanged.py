@@ -10,7 +10,7 @@ from truearm.doubts.outliers import ROWS_EXCHANGED, TARGETS_EXCHANGED
 from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
-from truearm.fits.fitting import Task
+from truearm.fits.fitting import Fits, Task
 from truearm.fits.models import CONSTANT, ArmModel
 from truearm.lengths import length_mm
 from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
@@ -36,11 +36,11 @@ class Exchanges:
     Attributes:
         notices: Warnings of rows whose points fit the readings of one another, and of targets exchanged in a
             row.
-        unbent: Constants that what is exchanged did not bend; None where the calibration's are such.
+        unbent: Constants that rows far off did not bend, where they were looked for beside such.
     """
 
     notices: tuple[Notice, ...] = ()
-    unbent: ArmModel | None = None
+    unbent: Fits | None = None
 
 
 def exchanges(task: Task, found: "Calibration", *, doubted: bool) -> Exchanges:
@@ -59,7 +59,7 @@ def exchanges(task: Task, found: "Calibration", *, doubted: bool) -> Exchanges:
         fits = unbent(task, rows)
     model = fits.models(task.arm)[CONSTANT]
     notices = _notices(found, FittedRows.of(fits, rows.side, found.selection), model)
-    return Exchanges(notices, model if notices else None)
+    return Exchanges(notices, fits)
 
 
 def _notices(found: "Calibration", rows: FittedRows, model: ArmModel) -> tuple[Notice, ...]:

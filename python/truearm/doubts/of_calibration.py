@@ -92,34 +92,37 @@ def of_result(
     rows, and the progress of the fitted ones (n,).
     """
     data, progress = given
-    told = _doubted(task, found, data, stages)
+    told, robust = _doubted(task, found, data, stages)
     if {notice.kind for notice in told} & WRONG_ROWS:
         return told
-    return [*told, *_of_left(task, found, progress)]
+    return [*told, *_of_left(task, found, progress, robust)]
 
 
-def _of_left(task: Task, found: Calibration, progress: Floats) -> list[Notice]:
-    """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
+def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | None) -> list[Notice]:
+    """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows, and `robust`
+    are constants that rows far off did not bend, if there are such.
+    """
     rows = found.rows
     if rows is None or found.scheme is not None or found.selection.distances:
         return []
     if may_be_bent(found) and rows.outliers():
-        found, rows = _unbent(task, found, rows)
+        found, rows = _unbent(task, found, rows, robust or unbent(task, rows))
     seen = Whitened.of(found, rows, progress)
     return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress)]
 
 
-def _unbent(task: Task, found: Calibration, rows: FittedRows) -> tuple[Calibration, FittedRows]:
+def _unbent(task: Task, found: Calibration, rows: FittedRows, fits: Fits) -> tuple[Calibration, FittedRows]:
     """The calibration with constants that its outliers do not bend, and the rows as these have them."""
-    fits = unbent(task, rows)
     constant, models = constant_details(task, fits), fits.models(task.arm)
     told = replace(found, models=models, identifiability=fits.identifiability, constant=constant)
     return told, FittedRows.of(fits, rows.side, task.selection)
 
 
-def _doubted(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
+def _doubted(
+    task: Task, found: Calibration, data: Measurements, stages: Stages
+) -> tuple[list[Notice], Fits | None]:
     """What makes a calibration doubtful; where it does not help, or found another arm, with what would
-    fit instead.
+    fit instead; and the constants that rows far off did not bend, if these were looked for.
     """
     doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
     if _many_are_off(found, doubted):
@@ -127,18 +130,19 @@ def _doubted(task: Task, found: Calibration, data: Measurements, stages: Stages)
             shifted = fits_shifted(task, data)
     if shifted:
         doubted = _of_errors(task, found, data, NO_OUTLIERS)
-        return [*doubted[:1], *shifted, *doubted[1:]]
+        return [*doubted[:1], *shifted, *doubted[1:]], None
     framed = _framed(task, found)
     exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
     if exchanged.notices:
         told = replace(found, notices=exchanged.notices)
-        doubted = _of_errors(task, told, data, Outliers.of(told), exchanged.unbent)
+        robust = None if exchanged.unbent is None else exchanged.unbent.models(task.arm)[CONSTANT]
+        doubted = _of_errors(task, told, data, Outliers.of(told), robust)
     doubted[1:1] = framed
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
     if not framed and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
-    return [*exchanged.notices, *doubted]
+    return [*exchanged.notices, *doubted], exchanged.unbent
 
 
 def _is_in_doubt(doubted: Sequence[Notice]) -> bool:
