@@ -15,7 +15,7 @@ use truearm_estimate::dense::{Eigen, transposed_product};
 use crate::FieldError;
 use crate::cells::{Axis, CellKernel};
 use crate::kernel::{Input, Shape};
-use crate::unknowns::Root;
+use crate::unknowns::{NEGLIGIBLE, Root};
 
 /// How a set-up moved.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,7 +166,7 @@ impl Curve {
         let scaled = input.scale * length;
         let axis = Axis::covering(input, [0.0, 1.0].into_iter(), scaled, scaled / PER_LENGTH, DEGREE);
         let cells = CellKernel::new(axis, |distance| Shape::Matern.at(distance, scaled));
-        let root = Root::new(&cells)?;
+        let root = Root::new(&cells, NEGLIGIBLE)?;
         let features: Vec<Vec<f64>> =
             left.progress.iter().map(|&at| features(&root, &cells, steps, at)).collect();
         let (rows, width) = (features.len(), features[0].len());

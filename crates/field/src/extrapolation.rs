@@ -6,17 +6,22 @@
 //! nearly one draw: what one needs tells nothing of what the next will, and the worst of many makes all others too
 //! wide. A row tells of the factor what its variance is the arm's part of: a coarse one next to nothing, whatever it misses by chance.
 
+use std::f64::consts::TAU;
+
 use truearm_estimate::Cancel;
 
 use crate::FieldError;
 use crate::data_space::{DataSpace, LeftOut};
 use crate::hyper::Hyper;
+use crate::kernel::InputKind;
 use crate::model::Model;
 use crate::outliers::QUANTILE_95;
 use crate::training::Training;
 
 /// Share of the poses that make a tail.
 const TAIL: f64 = 0.2;
+/// Values are of one level up to this share of how far apart they would stand if they were spread evenly.
+const LEVEL: f64 = 0.25;
 /// Fewer poses do not tell.
 const FEWEST_POSES: usize = 50;
 /// Largest factor: beyond, the field knows nothing.
@@ -80,17 +85,55 @@ fn is_within(row: &LeftOut, factor: f64) -> bool {
     row.residual.abs() <= QUANTILE_95 * variance.sqrt()
 }
 
-/// Poses with the largest and the smallest values of each input.
+/// Poses with the largest and the smallest values of each input, those of an angle to both sides of the widest gap on
+/// its circle.
 fn tails(training: &Training) -> Vec<Vec<usize>> {
-    let count = ((training.pose_count() as f64 * TAIL) as usize).max(1);
     let mut tails = Vec::new();
-    for k in 0..training.inputs.len() {
-        let mut order: Vec<usize> = (0..training.pose_count()).collect();
-        order.sort_by(|&a, &b| training.values_of(a)[k].total_cmp(&training.values_of(b)[k]));
-        tails.push(order[..count].to_vec());
-        tails.push(order[order.len() - count..].to_vec());
+    for (k, input) in training.inputs.iter().enumerate() {
+        let values = (0..training.pose_count()).map(|pose| training.values_of(pose)[k]);
+        let mut order = match input.kind {
+            InputKind::Line => ordered(values),
+            InputKind::Angle => ordered_on_circle(values),
+        };
+        for _ in 0..2 {
+            if let Some(count) = whole_levels(&order) {
+                tails.push(order[..count].iter().map(|&(_, pose)| pose).collect());
+            }
+            order.reverse();
+        }
     }
     tails
+}
+
+/// Values and whose they are, from the least to the largest.
+fn ordered(values: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
+    let mut order: Vec<(f64, usize)> = values.zip(0..).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order
+}
+
+/// The same of angles on one turn, which begins behind the widest gap.
+fn ordered_on_circle(values: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
+    let mut order = ordered(values.map(|value| value.rem_euclid(TAU)));
+    let before = |place: usize| match place {
+        0 => order[order.len() - 1].0 - TAU,
+        _ => order[place - 1].0,
+    };
+    let gap = |place: usize| order[place].0 - before(place);
+    let start = (0..order.len()).max_by(|&a, &b| gap(a).total_cmp(&gap(b))).unwrap_or(0);
+    order[..start].iter_mut().for_each(|(value, _)| *value += TAU);
+    order.rotate_left(start);
+    order
+}
+
+/// How many of the first poses make a tail: some [`TAIL`] of all, and no level of values with a part of its poses, as the
+/// rest of it would tell what the tail holds. None where a level is of more than twice so many.
+fn whole_levels(order: &[(f64, usize)]) -> Option<usize> {
+    let (all, wanted) = (order.len() as f64, order.len() as f64 * TAIL);
+    let apart = LEVEL * (order.last()?.0 - order.first()?.0).abs() / all;
+    (1..order.len())
+        .filter(|&count| count as f64 <= 2.0 * wanted && (order[count].0 - order[count - 1].0).abs() > apart)
+        .min_by(|&a, &b| (a as f64 - wanted).abs().total_cmp(&(b as f64 - wanted).abs()))
 }
 
 #[cfg(test)]
@@ -105,6 +148,36 @@ mod tests {
             known: 1.0,
         };
         (0..19).map(|_| row(factor)).chain([row(100.0)]).collect()
+    }
+
+    fn poses(order: &[(f64, usize)]) -> Vec<usize> {
+        order.iter().map(|&(_, pose)| pose).collect()
+    }
+
+    #[test]
+    fn a_tail_is_of_whole_levels() {
+        let spread = ordered((0..100).map(|k| f64::from(k) / 7.0));
+        assert_eq!(whole_levels(&spread), Some(20));
+        let payload = |loaded: usize| ordered((0..100).map(move |k| if k < loaded { 5.0 } else { 0.0 }));
+        let tails = |mut order: Vec<(f64, usize)>| {
+            let low = whole_levels(&order);
+            order.reverse();
+            (low, whole_levels(&order))
+        };
+        assert_eq!(tails(payload(30)), (None, Some(30)));
+        assert_eq!(tails(payload(50)), (None, None));
+        assert_eq!(tails(payload(0)), (None, None), "a joint that is still");
+        // Four levels of a grid, as they are read back.
+        let read = ordered((0..100).map(|k| f64::from(k % 4) + 1e-5 * f64::from(k)));
+        assert_eq!(whole_levels(&read), Some(25));
+    }
+
+    #[test]
+    fn whole_turns_leave_tails_as_they_are() {
+        let angles: Vec<f64> = (0..50).map(|k| -1.0 + 0.1 * f64::from(k)).collect();
+        let turned = angles.iter().zip(0..).map(|(angle, k)| angle + TAU * f64::from(k % 3 - 1));
+        assert_eq!(poses(&ordered_on_circle(angles.iter().copied())), (0..50).collect::<Vec<_>>());
+        assert_eq!(poses(&ordered_on_circle(turned)), (0..50).collect::<Vec<_>>());
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct Judgement {
     pub score: Vec<f64>,
     /// Length of each pose's leave-one-out residual of the first target, (n,), m.
     pub distance: Vec<f64>,
+    /// Each pose's squared leave-one-out residual, every row's over the variance of its noise at full weight, (n,).
+    pub over_noise: Vec<f64>,
     /// Factor that makes 95 % of the standardised components lie within [`QUANTILE_95`], at least one.
     pub inflation: f64,
     /// Poses that are outliers.
@@ -68,11 +70,13 @@ pub fn judge(
         (0..training.pose_count()).filter(|&pose| !training.rows(pose).is_empty()).collect();
     let poses = 0..all.pose_count();
     let (mut squares, mut distance) = (vec![0.0; poses.len()], vec![0.0; poses.len()]);
+    let (mut over_noise, noise) = (vec![0.0; poses.len()], posterior.model().hyper.noise);
     let mut is_aside: Vec<bool> = poses.clone().map(|pose| !all.rows(pose).is_empty()).collect();
     for &pose in &took_part {
         let place = places[pose];
         squares[place] = square_of(&left_out.standardised[training.rows(pose)]);
         distance[place] = distance_of(&left_out.residual[training.rows(pose)]);
+        over_noise[place] = over_noise_of(training, pose, noise, &left_out.residual[training.rows(pose)]);
         is_aside[place] = false;
     }
     let sampled = |pose: usize| training.rows(pose).next().is_some_and(|row| left_out.sampled[row]);
@@ -86,6 +90,7 @@ pub fn judge(
     let others: Vec<usize> = poses.clone().filter(|&pose| is_aside[pose]).collect();
     for aside in judge_aside(posterior, solution, (all, &others), limit, cancel)? {
         (squares[aside.pose], distance[aside.pose]) = (aside.square, aside.distance);
+        over_noise[aside.pose] = aside.over_noise;
     }
     let score = |pose: usize| match all.rows(pose).len() {
         0 => 0.0,
@@ -94,7 +99,8 @@ pub fn judge(
     let components = trusted.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]);
     let inflation = (quantile(components.map(|z| z.abs()), 0.95) / QUANTILE_95).max(1.0);
     let score: Vec<f64> = poses.clone().map(score).collect();
-    Ok(Judgement { distance, outliers: poses.filter(|&pose| score[pose] > 1.0).collect(), score, inflation })
+    let outliers = poses.filter(|&pose| score[pose] > 1.0).collect();
+    Ok(Judgement { distance, over_noise, outliers, score, inflation })
 }
 
 fn square_of(standardised: &[f64]) -> f64 {
@@ -106,11 +112,22 @@ fn distance_of(residual: &[f64]) -> f64 {
     residual.iter().take(3).map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// Variance of a row's noise at full weight.
+fn noise_of(training: &Training, row: usize, noise: [f64; 2]) -> f64 {
+    training.weight[row] * training.noise_variance(row, noise)
+}
+
+/// Squares of a pose's residual (m,), each over the variance of its row's noise at full weight.
+fn over_noise_of(training: &Training, pose: usize, noise: [f64; 2], residual: &[f64]) -> f64 {
+    training.rows(pose).zip(residual).map(|(row, left)| left.powi(2) / noise_of(training, row, noise)).sum()
+}
+
 /// What is left of a pose that others stood for.
 struct Aside {
     pose: usize,
     square: f64,
     distance: f64,
+    over_noise: f64,
 }
 
 /// Judges poses of a training set that no posterior was inferred from: all that took part are others. What is below the limit of
@@ -129,16 +146,16 @@ fn judge_aside(
     let explained = explained(&part, solution)?;
     let left: Vec<f64> =
         part.residual.iter().zip(explained).map(|(residual, known)| residual - known).collect();
-    let noise = |row: usize| part.weight[row] * part.noise_variance(row, posterior.model().hyper.noise);
+    let noise = posterior.model().hyper.noise;
     let mut found = Vec::with_capacity(poses.len());
     let mut suspicious: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (k, &pose) in poses.iter().enumerate() {
         let rows = part.rows(k);
-        let square = rows.clone().map(|row| left[row].powi(2) / noise(row)).sum();
-        if square > limit(rows.len()) {
+        let over_noise = over_noise_of(&part, k, noise, &left[rows.clone()]);
+        if over_noise > limit(rows.len()) {
             suspicious.entry(rows.len()).or_default().push(k);
         }
-        found.push(Aside { pose, square, distance: distance_of(&left[rows]) });
+        found.push(Aside { pose, square: over_noise, distance: distance_of(&left[rows]), over_noise });
     }
     let chunks =
         suspicious.iter().flat_map(|(&count, some)| some.chunks(TOGETHER).map(move |some| (count, some)));
@@ -152,7 +169,7 @@ fn judge_aside(
             let first = part.rows(k).start;
             let covariance = Mat::from_fn(count, count, |i, j| {
                 let entry = (at * count + i) * count + j;
-                known[entry] + anew[entry] + if i == j { noise(first + i) } else { 0.0 }
+                known[entry] + anew[entry] + if i == j { noise_of(&part, first + i, noise) } else { 0.0 }
             });
             found[k].square = square_of(&standardised(covariance, &left[part.rows(k)])?);
         }
@@ -196,7 +213,7 @@ impl Training {
 pub struct News {
     /// Whether poses became outliers, or are none any more.
     pub poses: bool,
-    /// Share of all squared residuals that weights were given or taken away of.
+    /// Share of all squared residuals, over noise, that weights were given or taken away of.
     pub share: f64,
 }
 
@@ -219,8 +236,8 @@ impl Judgement {
             let rows = training.rows(pose);
             let Some(before) = training.weight_of(pose) else { continue };
             poses |= (before < 1.0) != (weight < 1.0);
-            changed += (before - weight).abs() * self.distance[pose].powi(2);
-            kept += weight * self.distance[pose].powi(2);
+            changed += (before - weight).abs() * self.over_noise[pose];
+            kept += weight * self.over_noise[pose];
             training.weight[rows].fill(weight);
         }
         News { poses, share: changed / (changed + kept).max(f64::MIN_POSITIVE) }
@@ -231,7 +248,8 @@ impl Judgement {
         let of = |values: &[f64]| pose_of.iter().map(|&pose| values[pose]).collect::<Vec<f64>>();
         let score = of(&self.score);
         let outliers = (0..score.len()).filter(|&shot| score[shot] > 1.0).collect();
-        Judgement { distance: of(&self.distance), outliers, score, inflation: self.inflation }
+        let (distance, over_noise) = (of(&self.distance), of(&self.over_noise));
+        Judgement { distance, over_noise, outliers, score, inflation: self.inflation }
     }
 }
 

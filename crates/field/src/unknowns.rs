@@ -4,10 +4,14 @@ use faer::Mat;
 use truearm_estimate::dense::Eigen;
 
 use crate::cells::CellKernel;
-use crate::model::Model;
+use crate::model::{BlockPlan, Model};
 
-/// Eigenvalues below this share of the largest are left out.
-const NEGLIGIBLE: f64 = 1e-5;
+/// Eigenvalues below this share of the largest are left out, where noise hides what they stand for.
+pub const NEGLIGIBLE: f64 = 1e-5;
+/// Of a block, at the rows, at most so much of the noise's variance is left out with one eigenvalue.
+const HIDDEN: f64 = 0.1;
+/// Smaller shares are rounding.
+const ROUNDING: f64 = 1e-13;
 /// Of products of eigenvalues those below such a share: the first that leaves few unknowns, or the last, which leaves out less than
 /// a hundredth of a block's prior variance.
 const SHARES: [f64; 3] = [NEGLIGIBLE, 1e-4, 1e-3];
@@ -22,13 +26,14 @@ pub struct Root {
 }
 
 impl Root {
-    /// Of an axis's cells; `None` where their prior has no eigenvectors.
-    pub fn new(cells: &CellKernel) -> Option<Self> {
+    /// Of an axis's cells, without eigenvalues below a share of the largest; `None` where their prior has no
+    /// eigenvectors.
+    pub fn new(cells: &CellKernel, share: f64) -> Option<Self> {
         let n = cells.axis.count;
         let matrix = Mat::from_fn(n, n, |i, j| cells.correlation[i.abs_diff(j)]);
         let Eigen { values, vectors } = Eigen::new(&matrix)?;
         let largest = values[n - 1];
-        let kept: Vec<usize> = (0..n).rev().filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
+        let kept: Vec<usize> = (0..n).rev().filter(|&k| values[k] > share * largest).collect();
         let entries = Mat::from_fn(n, kept.len(), |i, k| vectors[(i, kept[k])] * values[kept[k]].sqrt());
         Some(Self { entries, values: kept.iter().map(|&k| values[k] / largest).collect() })
     }
@@ -59,13 +64,17 @@ pub struct Unknowns {
 pub fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
     let plans = model.plans();
     let mut all = Vec::new();
-    for plan in &plans {
-        let roots = plan.axes.iter().map(|(_, cells)| Root::new(cells)).collect::<Option<_>>()?;
+    let most: Vec<f64> = plans.iter().map(|plan| most_hidden(model, plan)).collect();
+    for (plan, most) in plans.iter().zip(&most) {
+        let of_axis = |cells| Root::new(cells, NEGLIGIBLE.min(*most));
+        let roots = plan.axes.iter().map(|(_, cells)| of_axis(cells)).collect::<Option<_>>()?;
         all.push(Unknowns { start: 0, roots, combinations: Vec::new() });
     }
     let first = sag_start(model) + model.training.geometry.len();
     for share in SHARES {
-        all.iter_mut().for_each(|unknowns| unknowns.combinations = combinations(&unknowns.roots, share));
+        for (unknowns, most) in all.iter_mut().zip(&most) {
+            unknowns.combinations = combinations(&unknowns.roots, share.min(*most));
+        }
         let counts = plans.iter().zip(&all).map(|(plan, u)| u.combinations.len() * plan.driven.len());
         if model.by_column.rows.min(first + counts.sum::<usize>()) <= FEW {
             break;
@@ -79,6 +88,18 @@ pub fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
         }
     }
     Some((all, start))
+}
+
+/// The share of a block's prior variance that noise hides at the rows, in the mean.
+fn most_hidden(model: &Model, plan: &BlockPlan) -> f64 {
+    let training = &model.training;
+    let entries = training.jacobian.chunks_exact(training.columns.len());
+    let over_noise = entries.enumerate().map(|(row, entries)| {
+        let variance: f64 = plan.driven.iter().map(|&(p, variance)| entries[p].powi(2) * variance).sum();
+        variance / training.noise_variance(row, model.hyper.noise)
+    });
+    let seen = over_noise.sum::<f64>() / training.row_count() as f64;
+    (HIDDEN / seen).max(ROUNDING)
 }
 
 /// Where the weights of the `sag` block stand, one a lever.
@@ -119,7 +140,11 @@ mod tests {
     fn root(length: f64) -> Root {
         let turn = (0..400).map(|k| f64::from(k) * std::f64::consts::TAU / 400.0);
         let axis = Axis::covering(Input::ANGLE, turn, length, length / 2.0, 3);
-        Root::new(&CellKernel::new(axis, |distance| Shape::SquaredExponential.at(distance, length))).unwrap()
+        Root::new(
+            &CellKernel::new(axis, |distance| Shape::SquaredExponential.at(distance, length)),
+            NEGLIGIBLE,
+        )
+        .unwrap()
     }
 
     #[test]

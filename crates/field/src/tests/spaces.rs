@@ -12,6 +12,7 @@ use crate::hyper::{Hyper, WAVE_NAME};
 use crate::model::Model;
 use crate::outliers::{Judgement, judge};
 use crate::posterior::Posterior;
+use crate::refine::explained;
 use crate::training::Training;
 use crate::weight_space::WeightSpace;
 
@@ -135,6 +136,24 @@ fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
     let again = judged(&posterior, &training);
     assert_eq!(again.outliers, [101, 1503], "what has lost its weight is judged at its full weight");
     assert!(!again.reweigh(&mut training).poses);
+}
+
+/// What eigenvalues are left out of is seen where there is hardly any noise, be they small beside the largest.
+#[test]
+fn what_rows_without_noise_tell_is_the_same_in_both_spaces() {
+    let arm = scara(Truth { own: 3e-4, ..Truth::RIGID });
+    let training = rows_of(&arm, &Measure { noise: 1e-7, ..Measure::poses(150) }.of(&arm), |_| ());
+    let mut hyper = Hyper::start(&[0, 1], 4, [1e-6, 1e-5]);
+    (hyper.smooth_length, hyper.smooth_line_length) = (6.0, 6.0);
+    hyper.products.truncate(1);
+    hyper.products[0].lengths.fill(12.0);
+    hyper.products[0].amplitudes.fill(3e-3);
+    let [by_rows, by_weights] = both(&training, &hyper).map(|posterior| {
+        let solution = posterior.solve(&posterior.training().residual).unwrap();
+        explained(&training, &solution).unwrap()
+    });
+    let largest = by_rows.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    close(&by_weights, &by_rows, 0.1 * hyper.noise[0] / largest, "what is explained");
 }
 
 fn judged(posterior: &Posterior, all: &Training) -> Judgement {

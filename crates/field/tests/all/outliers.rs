@@ -68,3 +68,24 @@ fn genuine_local_error_is_no_outlier() {
     let fit = fit(&arm, &Measure::poses(80).of(&arm)).unwrap();
     assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement);
 }
+
+/// Outliers that are noticed by one target only have spoiled the fit whichever it is.
+#[test]
+fn it_is_no_matter_which_target_is_far_off() {
+    let arm = six_axes(Truth::BENDING);
+    let measure = Measure { targets: 3, ..Measure::poses(70) };
+    let mut set = measure.of(&arm);
+    for pose in [10, 33, 56] {
+        set.targets[9 * pose + 6 + pose % 3] += 2e-2;
+    }
+    let mut turned = set.clone();
+    for pose in turned.targets.chunks_mut(9) {
+        pose.rotate_right(3);
+    }
+    let [third, first] = [set, turned].map(|set| fit(&arm, &set).unwrap().field);
+    assert_eq!(third.judgement.outliers, [10, 33, 56]);
+    assert_eq!(first.judgement.outliers, [10, 33, 56]);
+    let (noise, as_first) = (third.hyper.noise[0], first.hyper.noise[0]);
+    assert!((noise / as_first - 1.0).abs() < 1e-3, "{noise} and {as_first}");
+    assert!((noise / measure.noise - 1.0).abs() < 0.2, "{noise}");
+}
