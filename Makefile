@@ -66,8 +66,10 @@ RUST_WHOLE := --release --locked --workspace --features truearm-python/extension
 rust-test: $(STAMPS)/built
 	$(CARGO) test $(RUST_WHOLE)
 
+# Tests of cells and servers wait for a part of their time: half as many more at once as there are processors.
 py-test: $(STAMPS)/built
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --durations=15
+	$(BIN)/python -m pytest --numprocesses "$$($(BIN)/python -c 'import os; print((3 * (os.cpu_count() or 1) + 1) // 2)')" \
+	  --dist worksteal --durations=15
 
 # The measurement cell killed, interrupted and with faults, in full; takes half an hour or more. What it finds is
 # kept in build/trials: python docs/make_trials.py build/trials
