@@ -234,7 +234,7 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
 
 def _check_quoted(table: Table, mark: str) -> None:
     """Raise UsageError if no field holds the mark that is between fields, which is the decimal one, too."""
-    if not any(np.char.find(table.texts(name), mark).max() >= 0 for name in table.names):
+    if not any(mark in cell for name in table.names for cell in table.cells(name)):
         raise UsageError(
             f'"{mark}" is both delimiter and decimal mark',
             where=table.where,
@@ -276,7 +276,7 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
 
 def _with_points(table: Table, name: str, options: str) -> Table:
     """A column with decimal commas as one with points."""
-    cells = table.texts(name)
+    cells = table.cells(name)
     pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
     if pointed:
         cell = cells[pointed[0] - 1]
@@ -286,12 +286,13 @@ def _with_points(table: Table, name: str, options: str) -> Table:
             rule="With a decimal comma there must be no points",
             way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out {options}decimal",
         )
-    return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count)
+    column = np.array([cell.replace(",", ".") for cell in cells], dtype=np.object_)
+    return Table(table.where, {name: column}, table.row_count)
 
 
 def _hint(table: Table, name: str, options: str) -> UsageError | None:
     """What is said of a column with commas in its numbers; None of others."""
-    commas = [cell for cell in table.texts(name).tolist() if "," in cell]
+    commas = [cell for cell in table.cells(name) if "," in cell]
     if not commas:
         return None
     both = "." in commas[0] or commas[0].count(",") > 1

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,10 +22,11 @@ from truearm.units import HEADER_UNITS, bare_unit
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Texts = NDArray[np.str_]
+Column = NDArray[np.object_] | Floats
+"""Texts as objects, as in an array of texts each takes what the longest takes; or numbers."""
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 WHOLE: Final = re.compile(r"\d+(\.0+)?")
-NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
 NAMELESS: Final = (
     "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ...; to "
@@ -55,7 +57,7 @@ class Table:
     """
 
     where: str
-    columns: dict[str, Texts | Floats]
+    columns: dict[str, Column]
     row_count: int
     remarks: tuple[str, ...] = ()
     numbers_of_rows: Integers | None = None
@@ -73,10 +75,14 @@ class Table:
 
     def texts(self, name: str) -> Texts:
         """A column as text, without blanks around it."""
+        return np.array(self.cells(name), dtype=np.str_)
+
+    def cells(self, name: str) -> list[str]:
+        """What `texts` gives as a list, which takes no more than the texts do."""
         column = self.columns[name]
-        if column.dtype.kind == "U":
-            return np.char.strip(column.astype(np.str_))
-        return np.array([_in_words(value) for value in column.tolist()], dtype=np.str_)
+        if column.dtype.kind == "f":
+            return [_in_words(value) for value in column.tolist()]
+        return [cell.strip() for cell in column.tolist()]
 
     def names_in(self, name: str) -> Texts:
         """A column of names; whole numbers alone go without the point that programs write behind a gap."""
@@ -93,7 +99,7 @@ class Table:
             InputError: If a cell holds text, NaN or an infinite value; names the rows.
         """
         column = self.columns[name]
-        if column.dtype.kind != "U":
+        if column.dtype.kind == "f":
             return self._checked(name, column.astype(np.float64), np.isinf(column.astype(np.float64)))
         if name not in self._numbers:
             self._numbers[name] = self._parsed(name)
@@ -108,16 +114,15 @@ class Table:
 
     def _parsed(self, name: str) -> Floats:
         values = np.full(self.row_count, np.nan)
-        cells = self.texts(name).tolist()
-        infinite = np.array([cell.casefold() in NOT_FINITE for cell in cells])
-        for row, cell in enumerate(cells):
-            if not cell or infinite[row]:
+        bad = np.zeros(self.row_count, dtype=np.bool_)
+        for row, cell in enumerate(self.cells(name)):
+            if not cell:
                 continue
             number = as_number(cell)
             if number is None:
                 raise self._no_number(name, row, cell)
-            values[row] = number
-        return self._checked(name, values, infinite | np.isinf(values))
+            values[row], bad[row] = number, not math.isfinite(number)
+        return self._checked(name, values, bad)
 
     def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
         if bad.any():
@@ -149,7 +154,7 @@ class Table:
         """What is said where a row repeats the header or holds the units of the columns; else empty."""
         if cell.casefold() == name.strip().casefold():
             return "The row repeats the header: remove it"
-        if holds_units(str(self.texts(each)[row]) for each in self.names):
+        if holds_units(self.cells(each)[row] for each in self.names):
             return (
                 "The row holds the units of the columns: remove it, and state them in their names, as "
                 f"{SAID}, or bring the file in by truearm import, which leaves it out"
@@ -165,13 +170,13 @@ def holds_units(cells: Iterable[str]) -> bool:
 
 def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
     """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
-    columns: dict[str, Texts | Floats] = {}
+    columns: dict[str, Column] = {}
     for name in frame.columns:
         column = frame[name]
         if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
             columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)
+            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.object_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
     return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
@@ -307,8 +312,10 @@ def split_table(
     if not named:
         raise InputError("no column has a name", where=where, way_out="Name the columns in the first line")
     _check_names({k + 1: header[k] for k in named}, where, nameless)
-    cells = np.array(rows, dtype=np.str_)
-    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows), remarks)
+    columns: dict[str, Column] = {
+        header[k]: np.array([row[k] for row in rows], dtype=np.object_) for k in named
+    }
+    return Table(where, columns, len(rows), remarks)
 
 
 def _counts(cells: Sequence[str]) -> bool:
