@@ -45,16 +45,16 @@ def test_a_session_that_is_closed_is_one_file_and_goes_on(closed):
         assert session.rows("PRAGMA journal_mode") == [("wal",)]
         session.add_outcome(1, "skipped")
         with Session(closed, writing=False) as reader:
-            assert reader.next_step().step == 2
+            assert reader.all_left()[0].step == 2
     assert journal_of(closed) == "delete"
 
 
 def test_a_session_that_somebody_reads_is_closed_at_once(closed):
     writer = Session(closed, writing=True)
     with Session(closed, writing=False) as reader:
-        assert reader.next_step().step == 1
+        assert reader.all_left()[0].step == 1
         writer.close()
-        assert reader.next_step().step == 1
+        assert reader.all_left()[0].step == 1
     assert outcomes_of(closed) == [(0, "too far")]
 
 
