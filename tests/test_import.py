@@ -337,7 +337,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "angle as a length": (
         PLAIN,
         {"columns": {**COLUMNS, "x": "px:deg"}},
-        'column "x" is said to be in deg: "px:deg". "x" has one of the units cm, um, in, m, mm. Write --map x',
+        'column "x" is said to be in deg: "px:deg". "x" has one of the units cm, um, in, m, mm. Write --map',
     ),
     "no unit": (
         PLAIN,
@@ -469,3 +469,19 @@ def test_angles_longer_than_a_turn_are_refused(kind: str, tmp_path: Path) -> Non
     assert len(import_table(path, plan(rotation=stated["deg"])).frame) == 2
     with pytest.raises(InputError, match="angles of 170 rad.*If these are degrees, say deg"):
         import_table(path, plan(rotation=stated["rad"]))
+
+
+def test_lines_that_end_with_a_mark_that_the_header_has_not_are_told(tmp_path: Path) -> None:
+    header, *rows = PLAIN.split()
+    path = write(tmp_path, "\n".join(["made by a tracker", header, *(f"{row}," for row in rows)]))
+    told = r'rows 1 and 2 have another number.*: --skip-lines 2 --columns "J1,J2,px,py,...,-"'
+    with pytest.raises(InputError, match=told):
+        import_table(path, plan(skip_lines=1))
+    named = plan(skip_lines=2, names=(*header.split(","), "-"))
+    assert len(import_table(path, named).frame) == 2
+
+
+def test_a_name_may_have_a_line_break_within_quotes(tmp_path: Path) -> None:
+    path = write(tmp_path, PLAIN.replace("J1", '"J1\nbase"'))
+    found = import_table(path, plan(columns=COLUMNS | {"q1": "J1\nbase"})).frame
+    assert found["x"].tolist() == [1.0, 1.5]

@@ -125,7 +125,8 @@ def _check_lengths(arrays: Arrays, beginnings: Sequence[str], rows: int, exempt:
 
 def _check_rows(arrays: Arrays) -> None:
     for name, (are_good, rule) in OF_EACH_ROW.items():
-        bad = np.argwhere(~are_good(arrays[name])) if name in arrays else ()
+        values = arrays.get(name, np.empty((0, 1)))
+        bad = np.argwhere(~are_good(values))
         if len(bad):
-            value = arrays[name][tuple(bad[0])].tolist()
+            value = values[tuple(bad[0])].tolist()
             raise InputError(f"'{name}' holds {value} in row {bad[0][0] + 1}", rule=rule)
