@@ -19,6 +19,9 @@ from truearm.simulation import VirtualArm
 from truearm.storage import calibration_file
 from truearm.storage.calibration_file import DIGEST, NO_DIGEST
 
+DEEP = '{"a":' + 100_000 * "[" + 100_000 * "]" + "}"
+"""JSON in which Python cannot look down to the ground."""
+
 
 @pytest.fixture(scope="module")
 def calibrated():
@@ -187,6 +190,7 @@ def test_a_missing_key_is_said(tmp_path):
         (("robot",), 1.5, "what this calibration holds cannot be read"),
         (("selection", "targets"), 1.5, "'selection.targets' is 1.5. Input should be a valid list"),
         (("variable", "hyper", "sag"), "1", "'variable.hyper.sag' is '1'. Input should be a valid list"),
+        (("rows", "words", "group", 0), "zzz", 'rows are of the set-up "zzz"'),
         (("groups",), ["morning"], "the calibration names 1 set-ups. Its models have 2"),
         (("version",), 7, "'version' is 7"),
     ],
@@ -215,10 +219,14 @@ def test_numbers_of_other_kinds_in_memory_are_stored_as_ours(tmp_path):
     assert ta.Calibration.load(tmp_path / "odd.calib").rows is not None
 
 
-def _nan(values):
+def _last(values, value):
     changed = values.copy()
-    changed.flat[-1] = np.nan
+    changed.flat[-1] = value
     return changed
+
+
+def _nan(values):
+    return _last(values, np.nan)
 
 
 @pytest.mark.parametrize(
@@ -237,6 +245,10 @@ def _nan(values):
         ("constant.constants", lambda values: values.astype(np.float32), "holds float32 numbers. It holds f"),
         ("constant.covariance", lambda values: values[:-1], "'constant.covariance' has shape"),
         ("constant.standard_errors", lambda values: values[:-1], "'constant.standard_errors' has shape"),
+        ("rows.targets", lambda values: _last(values, np.inf), "'rows.targets' holds .*inf.* in row"),
+        ("rows.targets", _nan, "All numbers of one are finite, or all NaN"),
+        ("rows.sigma_m", lambda values: _last(values, -1.0), "'rows.sigma_m' holds -1.0 in row .*Each is"),
+        ("outcome.weight", lambda values: _last(values, 1.5), "holds 1.5 in row .* between 0 and 1"),
         ("rows.targets", None, "the calibration has no 'rows.targets'"),
         ("rows.readings", lambda values: values[:, :-1], "'rows.readings' has shape"),
         ("outcome.weight", lambda values: values.astype(np.float32), "'outcome.weight' holds float32"),
@@ -287,6 +299,11 @@ def test_numbers_beyond_all_are_refused(written, tmp_path):
         ta.Calibration.load(tmp_path / "odd.calib")
 
 
+def nested(header):
+    """A safetensors file of a header alone."""
+    return len(header).to_bytes(8, "little") + header
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -296,6 +313,10 @@ def test_numbers_beyond_all_are_refused(written, tmp_path):
         (save_arrays({"a": np.zeros(3)}), "safetensors file, but no calibration"),
         (save_arrays({"a": np.zeros(3)}, {"truearm": "[1]"}), "no JSON object"),
         (json.dumps({"robot": "UR10"}).encode(), "no calibration file"),
+        pytest.param(nested(DEEP.encode()), "its header is no JSON", id="deep header"),
+        pytest.param(
+            save_arrays({"a": np.zeros(3)}, {"truearm": DEEP}), "its metadata is no JSON", id="deep metadata"
+        ),
     ],
 )
 def test_files_that_are_no_calibration(content, words, tmp_path):

@@ -119,6 +119,20 @@ def test_values_changed_to_what_they_cannot_be_are_told(change, message, finishe
             assert "attempts is" in said
 
 
+def test_a_session_that_has_lost_its_arm_is_told(finished, copied, capsys):
+    with closing(sqlite3.connect(copied, isolation_level=None)) as database:
+        database.execute("DELETE FROM meta WHERE key = 'arm'")
+    for said in told_by_commands(copied, finished, capsys):
+        assert "meta holds no arm" in said or "of another arm" in said
+
+
+def test_a_byte_of_the_schema_that_is_no_text_is_told(finished, copied, capsys):
+    content = copied.read_bytes()
+    copied.write_bytes(content.replace(b"CREATE TABLE readings", b"CREA\xf0E TABLE readings", 1))
+    for said in told_by_commands(copied, finished, capsys):
+        assert "the session file is damaged: it holds bytes that are not UTF-8" in said
+
+
 def test_features_that_are_no_number_are_kept_and_read(copied):
     with closing(sqlite3.connect(copied, isolation_level=None)) as database:
         database.execute('UPDATE readings SET features = \'{"humidity": NaN, "dust": Infinity}\'')

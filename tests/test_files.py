@@ -15,6 +15,7 @@ from truearm.files import (
     check_place,
     followed,
     make_directory,
+    parsed,
     read_bytes,
     write_all,
     write_whole,
@@ -204,3 +205,8 @@ def test_a_place_that_takes_no_file_is_told_before_the_work(words, tmp_path, mon
     monkeypatch.setattr("truearm.robot.Robot.load", begin)
     assert main([*words, "nowhere/a.html"]) == 1
     assert capsys.readouterr().err == "Error: nowhere: there is no such directory.\n"
+
+
+def test_a_list_in_a_list_in_a_list_and_so_on_is_no_toml():
+    with pytest.raises(InputError, match=r"deep.toml: not TOML: "):
+        parsed("a = " + 5_000 * "[" + 5_000 * "]", where="deep.toml")

@@ -1,5 +1,6 @@
 """Measurement files that are wrong: the message says what, where, the rule and the way out."""
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,11 @@ TABLES = {
     ),
     "mixed lengths": ("q1,x_mm,y,z_mm", ["0,1,2,3"], 'mixed units: column "x_mm" is in mm, "y" in SI'),
     "mixed lengths of targets": ("q1,x,y,z,x2_mm,y2_mm,z2_mm", ["0,1,2,3,4,5,6"], "mixed units"),
+    "NaN with a sign": (
+        "q1,x,y,z",
+        ["0,-nan,2,3", "0,1,+NaN,3"],
+        r'column "x" holds NaN or infinite values in row 1',
+    ),
     "NaN": (
         "q1,x,y,z",
         ["0,1,2,3", "0,nan,2,3", "1,2,3,NaN"],
@@ -210,6 +216,20 @@ def test_options_that_contradict_the_file(tmp_path: Path, header: str, options: 
     path.write_text(f"{header}\n0,1,2,3\n")
     with pytest.raises(InputError, match=message):
         Measurements.read_csv(path, **options)
+
+
+def test_a_long_note_takes_no_more_room_than_it_has(tmp_path: Path) -> None:
+    path = tmp_path / "noted.csv"
+    rows = [f"0,{k},2,3,{'x' * 5_000 if k == 7 else ''}" for k in range(2_000)]
+    path.write_text("\n".join(["q1,x,y,z,note", *rows]))
+    tracemalloc.start()
+    try:
+        data = Measurements.read_csv(path)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert len(data) == 2_000
+    assert most < 10e6
 
 
 def test_bad_data_frames() -> None:

@@ -180,7 +180,8 @@ def test_a_division_survives_its_file(divided, tmp_path):
     assert (again.ended, again.batches) == (found.ended, found.batches)
 
 
-@pytest.mark.parametrize("text", ["{}", "no JSON", '{"format": "other"}', "[1]"])
+@pytest.mark.parametrize("text", ["{}", "no JSON", '{"format": "other"}', "[1]", 200_000 * "["],
+                         ids=["empty", "text", "other", "list", "deep"])  # fmt: skip
 def test_a_file_that_is_no_division_is_refused(text, tmp_path):
     (tmp_path / "bad.json").write_text(text)
     with pytest.raises(InputError, match="no division"):

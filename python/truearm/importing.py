@@ -26,11 +26,11 @@ from truearm.tables.measured_fields import read_fields
 from truearm.tables.raw_tables import Marks, RawTable, read_raw
 from truearm.tables.reading import table_from_frame
 from truearm.tables.rotation_columns import RotationColumns
-from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
+from truearm.units import ANGLE_UNITS, COLUMN_ANGLE_UNITS, COLUMN_LENGTH_UNITS, STATED_LENGTH_UNITS, to_si
 
 Floats = NDArray[np.float64]
 
-UNITS: Final = STATED_LENGTH_UNITS + ANGLE_UNITS
+UNITS: Final = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
 WHICH: Final = "target"
 """Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
 POINT: Final = ("x", "y", "z")
@@ -259,7 +259,7 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
         UsageError: If it is not stated, is one that no such column has, or another one than its name says.
     """
     _, unit = _split_unit(table, theirs)
-    known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else STATED_LENGTH_UNITS
+    known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else COLUMN_LENGTH_UNITS
     if ours in (*WORDS, *QUATERNION, WHICH):
         known = ()
     if unit and unit not in known:
@@ -283,19 +283,19 @@ def _check_header(table: RawTable, ours: str, theirs: str, stated: str) -> None:
     if said in ("", stated):
         return
     option = "--joint-unit" if JOINT.fullmatch(ours) else "--length-unit"
-    correct = f", {typed(f'{ours}={theirs}:{said}')} if its name is right" if said in UNITS else ""
+    right = typed(f"{ours}={theirs}:{said}") if said in UNITS else "convert this column in the file"
     raise UsageError(
         f'column "{theirs}" says {said}, {option} says {stated}',
         where=table.where,
         rule=AGREE,
         way_out=f"Give the right {option}, or state the unit of this column alone behind it: --map "
-        f"{typed(f'{ours}={theirs}:{stated}')} if its name is wrong{correct}",
+        f"{typed(f'{ours}={theirs}:{stated}')} if its name is wrong, {right} if its name is right",
     )
 
 
 def _written(ours: str, unit: str) -> str:
     """Name of a column that is written in SI: joints are angles unless their names say otherwise."""
-    return f"{ours}_m" if unit in STATED_LENGTH_UNITS and JOINT.fullmatch(ours) else ours
+    return f"{ours}_m" if unit in COLUMN_LENGTH_UNITS and JOINT.fullmatch(ours) else ours
 
 
 def _stated_unit(ours: str, plan: ImportPlan) -> str:

@@ -1,6 +1,7 @@
 """The session file: everything a measurement process has found out, on disk before the next motion starts.
 
-SQLite in write-ahead mode with full synchronisation: what was committed outlives process and power.
+SQLite in write-ahead mode with full synchronisation: what was committed outlives process and power. When the
+writer closes it, it is one file that can be read from where nothing can be written.
 """
 
 import json
@@ -8,7 +9,7 @@ import secrets
 import sqlite3
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +20,8 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from truearm.cell.reading import Reading
-from truearm.cell.session_checks import check_values, unreadable, value_of
+from truearm.cell.session_checks import PUT_BACK, check_values, unreadable, value_of
+from truearm.cell.session_opening import connected, opened_to_read
 from truearm.cell.session_schema import SCHEMA, VERSION
 from truearm.errors import InputError, WorkError
 from truearm.rotations import quaternion_from_matrix
@@ -107,10 +109,7 @@ class Session:
         self.path = path
         self._keeps = writing
         self._lock = (lock or _locked(path)) if writing else None
-        mode = "rwc" if writing else "ro"
-        self._db = sqlite3.connect(
-            f"{path.resolve().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
-        )
+        self._db = connected(path, "mode=rwc") if writing else opened_to_read(path)
         try:
             self._check_version()
             check_values(self.rows, path)
@@ -118,6 +117,7 @@ class Session:
                 self._write("PRAGMA journal_mode=WAL")
                 self._write("PRAGMA synchronous=FULL")
         except BaseException:
+            self._keeps = False
             self.close()
             raise
 
@@ -162,7 +162,15 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """Close the file and let others write to it."""
+        """Close the file and let others write to it.
+
+        What was written is brought into the file itself, unless somebody reads it now: such a file is read
+        where SQLite can make no other beside it.
+        """
+        if self._keeps:
+            with suppress(sqlite3.Error):
+                self._db.execute("PRAGMA busy_timeout=0")
+                self._db.execute("PRAGMA journal_mode=DELETE")
         self._keeps = False
         if hasattr(self, "_db"):
             self._db.close()
@@ -181,6 +189,18 @@ class Session:
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - a JSON value
         """Keep a value of the head of the file, in the place of the one that may be there."""
         self._write("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))
+
+    @property
+    def arm(self) -> dict[str, Any]:
+        """The arm that is measured, as Robot.to_dict gives it.
+
+        Raises:
+            InputError: If the head of the file has lost it.
+        """
+        found = self.meta("arm")
+        if found is None:
+            raise InputError("meta holds no arm", where=str(self.path), way_out=PUT_BACK)
+        return dict(found)
 
     def next_step(self) -> Step | None:
         """The first step that has no outcome."""
@@ -278,7 +298,7 @@ class Session:
         """
         try:
             return self._db.execute(query, values).fetchall()
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             raise unreadable(error, self.path) from None
 
     def measured_poses(self) -> int:
@@ -353,7 +373,7 @@ class Session:
                 where=str(self.path),
                 way_out="What it says is stored is there. Make room, then the same command goes on",
             ) from None
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             self._keeps = False
             raise unreadable(error, self.path) from None
 

@@ -25,6 +25,9 @@ NOT_DAMAGE: Final = (
     sqlite3.SQLITE_READONLY,
 )
 PRIMARY: Final = 0xFF
+NO_FILES: Final = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+"""The files that SQLite needs beside it cannot be made."""
+COPY: Final = "Copy it, with the files of its name and -wal and -shm, to where files can be written"
 NUMBERS: Final = "a list of numbers, one a joint, in JSON"
 # How many readings the first step has: one a joint.
 JOINTS: Final = "(SELECT json_array_length(readings) FROM steps ORDER BY step LIMIT 1)"
@@ -141,11 +144,14 @@ DOUBTED_FEATURES: Final = (
 )
 
 
-def unreadable(error: sqlite3.DatabaseError, path: Path) -> InputError:
+def unreadable(error: sqlite3.DatabaseError | UnicodeDecodeError, path: Path) -> InputError:
     """The error to raise where a session file cannot be read."""
-    if getattr(error, "sqlite_errorcode", 0) & PRIMARY in NOT_DAMAGE:
-        return InputError(f"the session cannot be read: {error}", where=str(path))
-    return InputError(f"the session file is damaged: {error}", where=str(path), way_out=RECOVER)
+    code = getattr(error, "sqlite_errorcode", 0) & PRIMARY
+    if code in NOT_DAMAGE:
+        way_out = COPY if code in NO_FILES else ""
+        return InputError(f"the session cannot be read: {error}", where=str(path), way_out=way_out)
+    what = "it holds bytes that are not UTF-8" if isinstance(error, UnicodeDecodeError) else error
+    return InputError(f"the session file is damaged: {what}", where=str(path), way_out=RECOVER)
 
 
 def check_values(rows: Rows, path: Path) -> None:

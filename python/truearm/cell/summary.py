@@ -28,7 +28,7 @@ def summary_of(session: Session) -> dict[str, Any]:
     events = session.rows("SELECT kind, count(*) FROM events GROUP BY 1 ORDER BY 1")
     return {
         "cell": session.meta("cell"),
-        "arm": session.meta("arm")["name"],
+        "arm": session.arm["name"],
         "poses": sum(count for (kind, _), count in counts.items() if kind == "pose"),
         "measured": counts.get(("pose", "measured"), 0),
         "open": counts.get(("pose", "open"), 0),

@@ -52,6 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Words behind `truearm`; those of the process by default.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    console.open_what_is_closed()
     console.say_all()
     try:
         _check_none_empty(given)

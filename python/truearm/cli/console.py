@@ -6,6 +6,7 @@ import sys
 from codecs import lookup
 from collections.abc import Iterable, Sequence
 from io import TextIOWrapper
+from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,6 +21,22 @@ FAILED: Final = 1
 USAGE: Final = 2
 INTERRUPTED: Final = 130
 WIDTH: Final = 80
+
+
+def open_what_is_closed() -> None:
+    """Let streams that were closed when the program was started (2>&-) be empty ones that take everything.
+
+    Python has none in their places then, and the next file that is opened would get the number of one.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            # Numbers are given from the lowest on, so that it is this one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - for good
 
 
 def say_all() -> None:

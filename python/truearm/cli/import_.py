@@ -9,7 +9,7 @@ from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest, warn
 from truearm.errors import UsageError, count_of, in_words, typed
 from truearm.files import check_output, write_whole
-from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
+from truearm.units import COLUMN_ANGLE_UNITS, COLUMN_LENGTH_UNITS
 
 if TYPE_CHECKING:
     from truearm.importing import Imported
@@ -141,7 +141,8 @@ def _pairs(options: list[str], option: str) -> dict[str, str]:
         ours, mark, theirs = text.partition("=")
         if not mark and option == "--keep":
             name, _, unit = text.rpartition(":")
-            ours, theirs = name if name and unit in STATED_LENGTH_UNITS + ANGLE_UNITS else text, text
+            known = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
+            ours, theirs = name if name and unit in known else text, text
         if not ours or not theirs:
             raise UsageError(f'"{text}" is no pair of columns', where=option, rule="Write OURS=THEIRS")
         if ours in pairs:

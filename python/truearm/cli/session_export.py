@@ -40,7 +40,7 @@ def command(
         raise UsageError(f"{target} is there already", way_out=f"To write over it name it: -o {target}")
     check_output(target, session)
     with Session(session, writing=False) as known:
-        table, arm = accepted_table(known), Robot.from_dict(known.meta("arm"))
+        table, arm = accepted_table(known), Robot.from_dict(known.arm)
         moved, unchecked = moved_poses(known, table), unchecked_poses(known)
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))

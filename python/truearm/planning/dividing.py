@@ -166,7 +166,7 @@ class DividedSpace:
         try:
             content = json.loads(read_text(Path(path)))
             return cls._of(content)
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(
                 f"this is no division: {error}", where=str(path), rule="Files that DividedSpace.save wrote"
             ) from None

@@ -1,6 +1,6 @@
 """What the arrays of a calibration file have to be: of what numbers, whether finite, of which shape."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +32,28 @@ OF_REGIONS: Final = (".regions.axis", ".regions.child")
 FILE_BEFORE: Final = "update.before"
 
 
+def _whole(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(np.isfinite(values).all(axis=-1) | np.isnan(values).all(axis=-1))
+
+
+def _no_less_than_zero(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(np.isnan(values) | (np.isfinite(values) & (values >= 0.0)))
+
+
+Good = Callable[[NDArray[Any]], NDArray[np.bool_]]
+WHOLE: Final = "All numbers of one are finite, or all NaN where it was not measured"
+POSITIVE: Final = "Each is zero or more, or NaN where there is none"
+OF_EACH_ROW: Final[Mapping[str, tuple[Good, str]]] = {
+    "rows.readings": (np.isfinite, "All are finite"),
+    "rows.targets": (_whole, WHOLE),
+    "rows.orientations": (_whole, WHOLE),
+    "rows.sigma_m": (_no_less_than_zero, POSITIVE),
+    "rows.distance_m": (_no_less_than_zero, POSITIVE),
+    "outcome.weight": (lambda values: (values >= 0.0) & (values <= 1.0), "Weights are between 0 and 1"),
+}
+"""Which values of arrays of rows are good, and the rule: what a fit takes, and deviations are found from."""
+
+
 def check_arrays(arrays: Arrays, content: Mapping[str, Any], table: tuple[int, int], joints: int) -> None:
     """Raise InputError where an array holds what none of a calibration does.
 
@@ -60,6 +82,7 @@ def check_arrays(arrays: Arrays, content: Mapping[str, Any], table: tuple[int, i
         _check_shape(arrays, "rows.targets", ("any", "any", 3))
         exempt = OF_DISTANCES if content["selection"]["distances"] else ()
         _check_lengths(arrays, OF_ROWS, len(arrays["rows.readings"]), exempt)
+        _check_rows(arrays)
     if content.get(HELD) is not None:
         _check_shape(arrays, "held.readings", ("any", joints))
 
@@ -98,3 +121,12 @@ def _check_lengths(arrays: Arrays, beginnings: Sequence[str], rows: int, exempt:
         is_of_rows = name.partition(".")[0] in beginnings and name not in exempt
         if is_of_rows and values.shape[:1] != (rows,):
             raise InputError(f"'{name}' has shape {values.shape}", rule=f"There are {rows} rows")
+
+
+def _check_rows(arrays: Arrays) -> None:
+    for name, (are_good, rule) in OF_EACH_ROW.items():
+        values = arrays.get(name, np.empty((0, 1)))
+        bad = np.argwhere(~are_good(values))
+        if len(bad):
+            value = values[tuple(bad[0])].tolist()
+            raise InputError(f"'{name}' holds {value} in row {bad[0][0] + 1}", rule=rule)

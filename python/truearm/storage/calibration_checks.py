@@ -1,11 +1,11 @@
 """What the plain values of a calibration file have to be; robot and options check theirs themselves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from truearm.errors import InputError
+from truearm.errors import InputError, list_names
 
 Count = Annotated[int, Field(ge=0)]
 
@@ -99,3 +99,10 @@ def check_set_ups(groups: int, frames: int) -> None:
     """Raise InputError unless as many set-ups are named as there are frames of a model."""
     if groups != frames:
         raise InputError(f"the calibration names {groups} set-ups", rule=f"Its models have {frames}")
+
+
+def check_set_ups_of_rows(named: Sequence[str], groups: Sequence[str]) -> None:
+    """Raise InputError where rows are of a set-up that the calibration does not have."""
+    for name in named:
+        if name not in groups:
+            raise InputError(f'rows are of the set-up "{name}"', rule=f"It has {list_names(groups)}")

@@ -30,7 +30,7 @@ from truearm.judgement.validation import Validation
 from truearm.robot import Robot
 from truearm.storage import rows_content
 from truearm.storage.calibration_arrays import as_stored, check_arrays
-from truearm.storage.calibration_checks import check_plain, check_set_ups
+from truearm.storage.calibration_checks import check_plain, check_set_ups, check_set_ups_of_rows
 from truearm.storage.calibration_file import AGAIN
 
 if TYPE_CHECKING:
@@ -120,6 +120,8 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     for model in models.values():
         check_set_ups(len(content["groups"]), len(model.setup.frames))
     rows = _read_rows(content, arrays, selection)
+    if rows is not None:
+        check_set_ups_of_rows(rows.data.groups, content["groups"])
     measured = _read_measured(content, selection, rows)
     identifiability = Identifiability.from_dict(content["identifiability"])
     details = _read_constant(constant, arrays)

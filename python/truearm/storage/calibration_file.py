@@ -108,7 +108,7 @@ def _header(data: bytes, where: str) -> dict[str, Any]:
     size = _check_first(data[:FIRST_BYTES], len(data), where)
     try:
         header = json.loads(data[LENGTH_BYTES : LENGTH_BYTES + size])
-    except ValueError:
+    except (ValueError, RecursionError):
         raise _altered(where, "its header is no JSON") from None
     if not isinstance(header, dict):
         raise _not_ours(where, "this is no calibration file")
@@ -123,7 +123,7 @@ def _content(header: dict[str, Any], where: str) -> dict[str, Any]:
         raise _not_ours(where, "this is a safetensors file, but no calibration")
     try:
         content = json.loads(text, parse_float=_finite, parse_constant=_finite)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise _altered(where, "its metadata is no JSON") from None
     if not isinstance(content, dict):
         raise _altered(where, "its metadata is no JSON object")

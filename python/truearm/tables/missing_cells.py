@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from truearm.tables.reading import Table, as_number
+from truearm.tables.reading import Column, Table, as_number
 
 
 def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple[Table, tuple[str, ...]]:
@@ -18,12 +18,13 @@ def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple
     if not missing:
         return table, ()
     stated = {word: _meant(word, decimal) for word in missing}
-    columns, found = {}, set()
+    columns, found = dict[str, Column](), set()
     for name in table.names:
-        cells = table.texts(name)
-        meant = [_meant(cell, decimal) for cell in cells.tolist()]
+        cells = table.cells(name)
+        meant = [_meant(cell, decimal) for cell in cells]
         found |= set(meant).intersection(stated.values())
-        columns[name] = np.where([one in stated.values() for one in meant], "", cells)
+        kept = ["" if one in stated.values() else cell for one, cell in zip(meant, cells, strict=True)]
+        columns[name] = np.array(kept, dtype=np.object_)
     left = tuple(word for word, one in stated.items() if one not in found)
     return Table(table.where, columns, table.row_count, table.remarks), left
 

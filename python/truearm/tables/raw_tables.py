@@ -1,8 +1,6 @@
 """Tables as other programs write them: marks, remarks and gaps as they are stated."""
 
 import codecs
-import csv
-import io
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,9 +17,11 @@ from truearm.tables.reading import (
     DELIMITERS,
     Table,
     Texts,
+    WaysOut,
     check_is_table,
     comment_of,
     delimiter_of,
+    first_record,
     quoted_delimiter,
     split_table,
 )
@@ -206,16 +206,7 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         text = "\n".join(map(_with_single_blanks, kept))
     if marks.names:
         text = _header(marks, text, delimiter, where) + text
-    quotes = f'. Numbers that hold "{delimiter}" need quotes' if delimiter == marks.decimal else ""
-    uneven = (
-        f"Correct or remove them; {marks.options}skip-lines leaves out lines above the header, "
-        f"--comment those of remarks{quotes}"
-    )
-    nameless = (
-        f"Name them; {marks.options}skip-lines leaves out lines above the header. To leave columns out: "
-        f'{marks.options}skip-lines {marks.skip_lines + 1} {marks.options}columns "{{}}"'
-    )
-    whole = split_table(text, delimiter, where=where, uneven=uneven, nameless=nameless)
+    whole = split_table(text, delimiter, where=where, ways_out=_ways_out(marks, delimiter))
     if delimiter == marks.decimal:
         _check_quoted(whole, delimiter)
     measured, units = (whole, {}) if marks.names else without_unit_row(whole)
@@ -232,9 +223,21 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
     return RawTable(where, parts, table.row_count, remarks=[*remarks, *whole.remarks], unsaid=unsaid)
 
 
+def _ways_out(marks: Marks, delimiter: str) -> WaysOut:
+    """What is said of a table that is not even."""
+    above = f"{marks.options}skip-lines leaves out lines above the header"
+    quotes = f'. Numbers that hold "{delimiter}" need quotes' if delimiter == marks.decimal else ""
+    named = f'{marks.options}skip-lines {marks.skip_lines + 1} {marks.options}columns "{{}}"'
+    return WaysOut(
+        f"Correct or remove them; {above}, --comment those of remarks{quotes}",
+        f"Lines end with a mark that the header has not: {named}",
+        f"Name them; {above}. To leave columns out: {named}",
+    )
+
+
 def _check_quoted(table: Table, mark: str) -> None:
     """Raise UsageError if no field holds the mark that is between fields, which is the decimal one, too."""
-    if not any(np.char.find(table.texts(name), mark).max() >= 0 for name in table.names):
+    if not any(mark in cell for name in table.names for cell in table.cells(name)):
         raise UsageError(
             f'"{mark}" is both delimiter and decimal mark',
             where=table.where,
@@ -248,10 +251,7 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
     Raises:
         UsageError: If it has another number of columns, or plainly a header.
     """
-    try:
-        first = next(fields for fields in csv.reader(io.StringIO(text), delimiter=delimiter) if fields)
-    except csv.Error as error:
-        raise InputError(f"not CSV: {error}", where=where) from None
+    first = first_record(text, delimiter, where=where)
     option = f"{marks.options}columns"
     if len(first) != len(marks.names):
         raise UsageError(
@@ -276,7 +276,7 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
 
 def _with_points(table: Table, name: str, options: str) -> Table:
     """A column with decimal commas as one with points."""
-    cells = table.texts(name)
+    cells = table.cells(name)
     pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
     if pointed:
         cell = cells[pointed[0] - 1]
@@ -286,12 +286,13 @@ def _with_points(table: Table, name: str, options: str) -> Table:
             rule="With a decimal comma there must be no points",
             way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out {options}decimal",
         )
-    return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count)
+    column = np.array([cell.replace(",", ".") for cell in cells], dtype=np.object_)
+    return Table(table.where, {name: column}, table.row_count)
 
 
 def _hint(table: Table, name: str, options: str) -> UsageError | None:
     """What is said of a column with commas in its numbers; None of others."""
-    commas = [cell for cell in table.texts(name).tolist() if "," in cell]
+    commas = [cell for cell in table.cells(name) if "," in cell]
     if not commas:
         return None
     both = "." in commas[0] or commas[0].count(",") > 1
@@ -347,7 +348,8 @@ def _plain_delimiter(text: str, where: str, options: str) -> str:
     """A comma, where the lines are plainly made of them or the first is a comment that names no columns."""
     header = text.lstrip().splitlines()[0]
     best = delimiter_of(text)
-    if best is None or (best == "," and "," not in header and not comment_of(header)):
+    one = best == "," and len(first_record(text.lstrip(), best, where=where)) == 1
+    if best is None or (one and not comment_of(header)):
         raise UsageError(
             f'the first line is one field: "{header[:SHOWN]}"',
             where=where,

@@ -2,13 +2,14 @@
 
 import csv
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,16 +22,35 @@ from truearm.units import HEADER_UNITS, bare_unit
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Texts = NDArray[np.str_]
+Column = NDArray[np.object_] | Floats
+"""Texts as objects, as in an array of texts each takes what the longest takes; or numbers."""
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 WHOLE: Final = re.compile(r"\d+(\.0+)?")
-NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
-UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
-NAMELESS: Final = (
-    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ...; to "
-    'leave columns out, with: truearm import FILE --skip-lines 1 --columns "{}" ...'
-)
 SHOWN_NAMES: Final = 4
+
+
+class WaysOut(NamedTuple):
+    """What is said of tables that are not even, where "{}" becomes names of columns, "-" for none.
+
+    Attributes:
+        uneven: Where lines have another number of fields than the header.
+        ended: Where each has one more, which is empty.
+        nameless: Where columns have no name.
+    """
+
+    uneven: str = "Correct or remove them; if the decimal mark is a comma, use truearm import"
+    ended: str = (
+        "Lines end with a mark that the header has not: bring the file in with: truearm import FILE "
+        '--skip-lines 1 --columns "{}" ...'
+    )
+    nameless: str = (
+        "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ...; "
+        'to leave columns out, with: truearm import FILE --skip-lines 1 --columns "{}" ...'
+    )
+
+
+USUAL: Final = WaysOut()
 UNIT_WORDS: Final = frozenset(("", "-", "1", "c", "°c", "degc", "k", "kg", "s", "ms", *HEADER_UNITS))
 """What stands below the names of columns where a row says their units."""
 SAID: Final = "q1_deg and x_mm"
@@ -55,7 +75,7 @@ class Table:
     """
 
     where: str
-    columns: dict[str, Texts | Floats]
+    columns: dict[str, Column]
     row_count: int
     remarks: tuple[str, ...] = ()
     numbers_of_rows: Integers | None = None
@@ -73,10 +93,14 @@ class Table:
 
     def texts(self, name: str) -> Texts:
         """A column as text, without blanks around it."""
+        return np.array(self.cells(name), dtype=np.str_)
+
+    def cells(self, name: str) -> list[str]:
+        """What `texts` gives as a list, which takes no more than the texts do."""
         column = self.columns[name]
-        if column.dtype.kind == "U":
-            return np.char.strip(column.astype(np.str_))
-        return np.array([_in_words(value) for value in column.tolist()], dtype=np.str_)
+        if column.dtype.kind == "f":
+            return [_in_words(value) for value in column.tolist()]
+        return [cell.strip() for cell in column.tolist()]
 
     def names_in(self, name: str) -> Texts:
         """A column of names; whole numbers alone go without the point that programs write behind a gap."""
@@ -93,7 +117,7 @@ class Table:
             InputError: If a cell holds text, NaN or an infinite value; names the rows.
         """
         column = self.columns[name]
-        if column.dtype.kind != "U":
+        if column.dtype.kind == "f":
             return self._checked(name, column.astype(np.float64), np.isinf(column.astype(np.float64)))
         if name not in self._numbers:
             self._numbers[name] = self._parsed(name)
@@ -108,16 +132,15 @@ class Table:
 
     def _parsed(self, name: str) -> Floats:
         values = np.full(self.row_count, np.nan)
-        cells = self.texts(name).tolist()
-        infinite = np.array([cell.casefold() in NOT_FINITE for cell in cells])
-        for row, cell in enumerate(cells):
-            if not cell or infinite[row]:
+        bad = np.zeros(self.row_count, dtype=np.bool_)
+        for row, cell in enumerate(self.cells(name)):
+            if not cell:
                 continue
             number = as_number(cell)
             if number is None:
                 raise self._no_number(name, row, cell)
-            values[row] = number
-        return self._checked(name, values, infinite | np.isinf(values))
+            values[row], bad[row] = number, not math.isfinite(number)
+        return self._checked(name, values, bad)
 
     def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
         if bad.any():
@@ -149,7 +172,7 @@ class Table:
         """What is said where a row repeats the header or holds the units of the columns; else empty."""
         if cell.casefold() == name.strip().casefold():
             return "The row repeats the header: remove it"
-        if holds_units(str(self.texts(each)[row]) for each in self.names):
+        if holds_units(self.cells(each)[row] for each in self.names):
             return (
                 "The row holds the units of the columns: remove it, and state them in their names, as "
                 f"{SAID}, or bring the file in by truearm import, which leaves it out"
@@ -165,13 +188,13 @@ def holds_units(cells: Iterable[str]) -> bool:
 
 def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
     """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
-    columns: dict[str, Texts | Floats] = {}
+    columns: dict[str, Column] = {}
     for name in frame.columns:
         column = frame[name]
         if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
             columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)
+            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.object_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
     return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
@@ -268,36 +291,25 @@ def check_is_table(text: str, *, where: str) -> None:
             )
 
 
-def split_table(
-    text: str, delimiter: str, *, where: str, uneven: str = UNEVEN, nameless: str = NAMELESS
-) -> Table:
+def split_table(text: str, delimiter: str, *, where: str, ways_out: WaysOut = USUAL) -> Table:
     """The fields of a text with a header line; every line must have as many as the header.
 
-    `uneven` is the way out where a line has another number, `nameless` where a column has no name; its {}
-    becomes the names of all columns, "-" for none. One with neither name nor content is left out: some
-    programs end lines with a delimiter. So is a first one without a name that counts the rows, as pandas
-    writes it.
+    A column with neither name nor content is left out: some programs end lines with a delimiter. So is a
+    first one without a name that counts the rows, as pandas writes it.
 
     Raises:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
             are no data rows.
     """
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    source = io.StringIO(_with_plain_ends(text))
     try:
-        lines = [line for line in csv.reader(io.StringIO(text), delimiter=delimiter, strict=True) if line]
+        lines = [line for line in csv.reader(source, delimiter=delimiter, strict=True) if line]
     except csv.Error as error:
         raise InputError(f"not CSV: {error}", where=where) from None
     header = [name.strip() for name in lines[0]]
     _check_header(header, where)
     rows = lines[1:]
-    bad = [number for number, row in enumerate(rows, start=1) if len(row) != len(header)]
-    if bad:
-        raise InputError(
-            f"{list_rows(bad)} {'has' if len(bad) == 1 else 'have'} another number of fields than the "
-            f"header's {len(header)}; {list_rows(bad[:1])} has {len(rows[bad[0] - 1])}",
-            where=where,
-            way_out=uneven,
-        )
+    _check_even(header, rows, where, ways_out)
     if not rows:
         raise InputError("there are no data rows below the header", where=where)
     named = [k for k, name in enumerate(header) if name or any(row[k].strip() for row in rows)]
@@ -306,9 +318,43 @@ def split_table(
     named = named[counts:]
     if not named:
         raise InputError("no column has a name", where=where, way_out="Name the columns in the first line")
-    _check_names({k + 1: header[k] for k in named}, where, nameless)
-    cells = np.array(rows, dtype=np.str_)
-    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows), remarks)
+    _check_names({k + 1: header[k] for k in named}, where, ways_out.nameless)
+    columns: dict[str, Column] = {
+        header[k]: np.array([row[k] for row in rows], dtype=np.object_) for k in named
+    }
+    return Table(where, columns, len(rows), remarks)
+
+
+def _check_even(header: Sequence[str], rows: Sequence[Sequence[str]], where: str, ways_out: WaysOut) -> None:
+    """Raise InputError unless all rows have as many fields as the header."""
+    bad = [number for number, row in enumerate(rows, start=1) if len(row) != len(header)]
+    if not bad:
+        return
+    ended = all(len(row) == len(header) + 1 and not row[-1].strip() for row in rows)
+    named = dict(enumerate([*header, ""], start=1))
+    raise InputError(
+        f"{list_rows(bad)} {'has' if len(bad) == 1 else 'have'} another number of fields than the "
+        f"header's {len(header)}; {list_rows(bad[:1])} has {len(rows[bad[0] - 1])}",
+        where=where,
+        way_out=ways_out.ended.format(_all_names(named)) if ended else ways_out.uneven,
+    )
+
+
+def first_record(text: str, delimiter: str, *, where: str) -> list[str]:
+    """The fields of the first line of a text that has any; one in quotes may go on in the next.
+
+    Raises:
+        InputError: If it is no CSV.
+    """
+    lines = io.StringIO(_with_plain_ends(text))
+    try:
+        return next((fields for fields in csv.reader(lines, delimiter=delimiter) if fields), [])
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", where=where) from None
+
+
+def _with_plain_ends(text: str) -> str:
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _counts(cells: Sequence[str]) -> bool:
@@ -363,7 +409,8 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
 def _all_names(names: Mapping[int, str]) -> str:
     """Names by their position as truearm import takes them, the first few; "-" leaves a column out."""
     each = [names.get(position) or "-" for position in range(1, max(names) + 1)]
-    return ",".join([*each[:SHOWN_NAMES], *["..."][: len(each) - SHOWN_NAMES]])
+    end = ["-"] if not names[max(names)] else []
+    return ",".join(each if len(each) <= SHOWN_NAMES + 1 else [*each[:SHOWN_NAMES], "...", *end])
 
 
 def _in_words(number: float) -> str:

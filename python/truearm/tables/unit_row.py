@@ -10,7 +10,7 @@ def without_unit_row(table: Table) -> tuple[Table, dict[str, str]]:
     Units are those of HEADER_UNITS, "" where the row says none of these. Where another row is all that there
     is, or the first holds anything else, the table comes back as it was.
     """
-    first = {name: str(table.texts(name)[0]) for name in table.names}
+    first = {name: table.cells(name)[0] for name in table.names}
     if table.row_count == 1 or not holds_units(first.values()):
         return table, {}
     rest = {name: column[1:] for name, column in table.columns.items()}
