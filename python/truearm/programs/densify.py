@@ -13,12 +13,13 @@ from truearm.kinds import check_positive
 from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
+from truearm.programs.following import CLOSE_RAD, Follower, Line
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn
 from truearm.programs.listing import listed_move
 from truearm.programs.program import LinearStep, Listed, Program, StepTexts
 from truearm.programs.tables import NOWHERE, Motion
 from truearm.robot import Robot
-from truearm.rotations import matrix_from_rotation_vector, rigid_inverse, rotation_vector_from_matrix
+from truearm.rotations import rigid_inverse
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,10 @@ TURN_RAD: Final = np.deg2rad(5.0)
 MOVES_NAMED: Final = 5
 FROM_ANYWHERE: Final = "where the arm comes from is not known"
 UNREACHED: Final = "the nominal arm does not reach all of the line"
+SINGULAR: Final = "the line leads too near to a singularity"
+ELSEWHERE: Final = (
+    "the line does not arrive at the readings of its target, which are of another configuration"
+)
 BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
 NO_ROOM: Final = "what blends it with its neighbours leaves no room for waypoints"
 OFFSET: Final = "its target has an offset, which a waypoint would not have"
@@ -125,7 +130,8 @@ class Densifier:
         spacing: Spacing,
     ) -> None:
         self._program, self._encoder, self._spacing = program, encoder, spacing
-        self._robot, self._inverse, self._compensator = models
+        self._robot, inverse, self._compensator = models
+        self._follower = Follower(self._robot, inverse)
         self._deviation_mm: dict[int, float] = {}
 
     def insert(self, nominal: Floats, changed: Bools, tell: Callable[[int, int], None]) -> Inserted:
@@ -180,16 +186,14 @@ class Densifier:
         poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
         if start != end:
             poses[0] = rigid_inverse(_moved(displacement)) @ _moved(uses.displacements[start]) @ poses[0]
-        line, within = _line(poses @ tool, self._spacing.least_m)
-        seeds = ends[0] + np.linspace(0.0, 1.0, len(line))[:, None] * (ends[1] - ends[0])
-        nominal = self._inverse.near_or_nan(line @ rigid_inverse(tool), seeds)
-        nominal[-1] = ends[-1]
+        shares, within = _shares(line := Line(*(poses @ tool)), self._spacing.least_m)
+        nominal = self._followed(line, tool, shares, ends)
+        if isinstance(nominal, str):
+            return nominal
         if start == end:
             nominal[0] = ends[0]
-        if np.isnan(nominal).any():
-            return UNREACHED
         found = self._compensator.joints(
-            np.ascontiguousarray(nominal),
+            nominal,
             tool=environment.tool.true,
             author=author_of(self._robot, environment.tool, displacement),
         )
@@ -204,6 +208,18 @@ class Densifier:
         if isinstance(chosen, str):
             return chosen
         return self._steps(move, environment, found.q[list(chosen)], tuple(chosen.values()))
+
+    def _followed(self, line: Line, tool: Floats, shares: Floats, ends: Floats) -> Floats | str:
+        """Readings (n, N) at shares (n,) of a line between those at its `ends` (2, N), or why not."""
+        found = self._follower.along(line, tool, shares, ends[0], ends[-1])
+        if found is None:
+            return SINGULAR
+        if np.isnan(found).any():
+            return UNREACHED
+        if np.abs(found[-1] - ends[-1]).max() > CLOSE_RAD:
+            return ELSEWHERE
+        found[-1] = ends[-1]
+        return found
 
     def _chosen(self, move: int, points: Floats, within: int) -> dict[int, float] | str:
         """Which of the points (n, 3), `within` steps in the least spacing, become waypoints of a move, and
@@ -263,25 +279,18 @@ def _moved(displacement: Transform | None) -> Transform:
     return np.eye(4) if displacement is None else displacement
 
 
-def _line(ends: Floats, least_m: float) -> tuple[Floats, int]:
-    """Poses (n, 4, 4) on the straight line between two, both ends included, and how many steps lie in the
-    least spacing; 0 where no waypoint has that on both sides.
+def _shares(line: Line, least_m: float) -> tuple[Floats, int]:
+    """Shares (n,) of a line, both ends included, and how many steps lie in the least spacing; 0 where no
+    waypoint has that on both sides.
     """
-    first, last = ends[:, :3, :3]
-    turn = rotation_vector_from_matrix(first.T @ last)
-    least = max(LEAST_SAMPLES, int(np.ceil(np.linalg.norm(turn) / TURN_RAD)))
-    length = float(np.linalg.norm(ends[1, :3, 3] - ends[0, :3, 3]))
-    count = min(int(length / least_m) * WITHIN, MOST_SAMPLES)
+    least = max(LEAST_SAMPLES, int(np.ceil(line.turn_rad / TURN_RAD)))
+    count = min(int(line.length_m / least_m) * WITHIN, MOST_SAMPLES)
     if count < LEAST_SAMPLES:
         count, within = least, 0
     else:
         finer = -(-least // count)
         count, within = count * finer, WITHIN * finer
-    along = np.linspace(0.0, 1.0, count + 1)
-    poses = np.tile(np.eye(4), (count + 1, 1, 1))
-    poses[:, :3, 3] = ends[0, :3, 3] + along[:, None] * (ends[1, :3, 3] - ends[0, :3, 3])
-    poses[:, :3, :3] = first @ matrix_from_rotation_vector(along[:, None] * turn)
-    return poses, within
+    return np.linspace(0.0, 1.0, count + 1), within
 
 
 def _clear_of(blends: tuple[float, float], points: Floats, margin_m: float) -> range:

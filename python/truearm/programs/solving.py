@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, EDGE_RAD, NearestTurns, meant, with_turns
+from truearm.programs.following import CLOSE_RAD, Arrived, Follower, Way
 from truearm.programs.layouts import of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight, numbers_of
 from truearm.programs.rounding import rounded_rad
-from truearm.programs.tables import NOWHERE, placed, run_of
+from truearm.programs.tables import NOWHERE, Motion, placed, run_of
 from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
@@ -58,7 +59,6 @@ SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
 AT_ONCE: Final = 1000
-CLOSE_RAD: Final = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +128,13 @@ class _Came(NamedTuple):
     """How the arm comes to a target.
 
     Attributes:
-        before: The readings that it comes from; None where they are not known.
-        straight: Whether it comes on a line or an arc.
+        before: The readings that it comes from, or a seed; None where they are not known.
+        way: The line or the arc on which it comes from there; None where it comes joint by joint.
         nearest: As in Program, of the move; None where configuration data counts.
     """
 
     before: Floats | None
-    straight: bool
+    way: Way | None
     nearest: bool | None
 
 
@@ -144,6 +144,7 @@ class _Solver:
     def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
         self._nearest_turns = NearestTurns(robot)
+        self._follower = Follower(robot, inverse)
         self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
         self._unheeded = {int(program.moves.target[move]) for move in program.nearest}
@@ -186,11 +187,16 @@ class _Solver:
     def _take_some(self, moved: Integers, poses: dict[int, Floats]) -> None:
         """The targets of these moves, all of which are in `poses`."""
         moves = self.program.moves
-        targets, nears, motions = (column[moved] for column in (moves.target, moves.near, moves.motion))
+        targets, nears = moves.target[moved], moves.near[moved]
         possible = self._possible(np.unique(targets), poses)
-        columns = (column.tolist() for column in (moved, targets, nears, motions))
-        for move, target, near, motion in zip(*columns, strict=True):
-            came = _Came(self._known(near), motion_is_straight(motion), self.program.nearest.get(move))
+        followed = np.where(nears == moves.before[moved], moves.motion[moved], Motion.JOINT)
+        columns = (column.tolist() for column in (moved, targets, nears, followed, moves.environment[moved]))
+        for move, target, near, motion, environment in zip(*columns, strict=True):
+            way = None
+            if motion_is_straight(motion):
+                tool = self.program.environments[environment].tool.controller
+                way = Way(tool, poses[target], motion != Motion.LINEAR)
+            came = _Came(self._known(near), way, self.program.nearest.get(move))
             self._take(target, possible[target], came)
 
     def _known(self, target: int) -> Floats | None:
@@ -312,10 +318,10 @@ class _Solver:
         if len(possible.branches) == 0:
             return OUT_OF_REACH
         if possible.named is None:
-            return self._unnamed(possible, came.before)
+            return self._unnamed(possible, came)
         if came.nearest is None:
             return self._stated(possible, possible.named, came)
-        found = self._unnamed(possible, came.before)
+        found = self._unnamed(possible, came)
         if isinstance(found, str):
             if found in {AMBIGUOUS, UNKNOWN_BEFORE}:
                 return UNHEEDED if came.nearest else PERHAPS_HEEDED
@@ -330,14 +336,29 @@ class _Solver:
             return NO_BRANCH
         before = came.before
         place = the_nearest(named.q, before)
-        if place is None or _may_be_turned(named, place):
-            return AMBIGUOUS
-        found: Floats = named.q[place]
-        if came.straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
-            _, every = self._nearest_turns(possible.branches, before)
-            if not is_nearest(found, every, before):
-                return CONTRADICTS
-        return SINGULAR if named.singular.any() else found
+        if place is not None and _may_be_turned(named, place):
+            place = None
+        found = AMBIGUOUS if place is None else named.q[place]
+        if came.way is not None and before is not None:
+            near = place is not None and np.abs(named.q[place] - before).max() <= CLOSE_RAD
+            found = found if near else self._stated_on(came.way, before, possible, named.q, found)
+        return SINGULAR if not isinstance(found, str) and named.singular.any() else found
+
+    def _stated_on(
+        self, way: Way, before: Floats, possible: _Possible, named: Floats, found: Floats | str
+    ) -> Floats | str:
+        """The readings that a line or an arc arrives in, if they are among those `named` (k, N).
+
+        Where it does not tell, those `found` without it, if none are nearer to the readings (N,) before.
+        """
+        turned = self._nearest_turns(possible.branches, before)
+        arrived = self._follower.arrived(before, way, possible.branches, turned)
+        if isinstance(arrived, Arrived):
+            same = np.abs(named - arrived.q).max(axis=1) <= SAME_RAD
+            return arrived.q if same.any() else CONTRADICTS
+        if isinstance(found, str) or is_nearest(found, turned[1], before):
+            return found
+        return arrived or CONTRADICTS
 
     def _from_seed(self, flange: Floats, before: Floats | None) -> Floats | str:
         """The readings that a search from those before arrives at, where it arrives near by."""
@@ -350,15 +371,25 @@ class _Solver:
             return FAR_SEED
         return SINGULAR if are_singular(self.robot, found[None])[0] else found
 
-    def _unnamed(self, possible: _Possible, before: Floats | None) -> Floats | str:
-        """The readings nearest to those before, where the text does not tell."""
-        if before is None:
+    def _unnamed(self, possible: _Possible, came: _Came) -> Floats | str:
+        """The readings that the way arrives in, or those nearest to where it comes from, where the text does
+        not tell.
+        """
+        if came.before is None:
             return UNKNOWN_BEFORE
-        which, candidates = self._nearest_turns(possible.branches, before)
-        place = the_nearest(candidates, before) if len(candidates) else None
-        if place is None:
-            return AMBIGUOUS
-        return SINGULAR if possible.at_singularity[which[place]] else candidates[place]
+        turned = self._nearest_turns(possible.branches, came.before)
+        arrived = None
+        if came.way is not None:
+            arrived = self._follower.arrived(came.before, came.way, possible.branches, turned)
+        if isinstance(arrived, str):
+            return arrived
+        if arrived is None:
+            which, candidates = turned
+            place = the_nearest(candidates, came.before) if len(candidates) else None
+            if place is None:
+                return AMBIGUOUS
+            arrived = Arrived(int(which[place]), candidates[place])
+        return SINGULAR if possible.at_singularity[arrived.branch] else arrived.q
 
 
 def the_nearest(candidates: Floats, before: Floats | None) -> int | None:
