@@ -17,7 +17,7 @@ class Harmonic:
     def __init__(self, rng):
         root = rng.normal(size=(10 * LINKS + SETUP, 10 * LINKS + SETUP))
         self.of_all = root @ root.T
-        self.asked = Counter()
+        self.asked = Counter[str]()
 
     def rows(self, inputs, jacobian, setup):
         setup = np.zeros((*jacobian.shape[:2], SETUP)) if setup is None else setup
