@@ -134,7 +134,7 @@ class Update:
 
     @property
     def is_less_certain(self) -> bool:
-        """Whether the old calibration is to be kept: it holds, and is clearly more certain than the updated."""
+        """Whether the old calibration is to be kept: it holds, and is clearly the more certain of the two."""
         return bool(less_certain(self.expected_mm))
 
     def _expected(self) -> dict[str, float | None]:
