@@ -83,7 +83,9 @@ def test_coarse_rows_of_an_arm_that_did_not_change_do_not_replace_its_calibratio
     assert "Nothing moved, and the calibration as it was is the more certain" in err
     assert "The old calibration is the more certain: keep old.calib." in out
     assert "--roll-back" not in out
-    report = ta.Calibration.load("coarse.calib").revision.report
+    revision = ta.Calibration.load("coarse.calib").revision
+    assert revision is not None
+    report = revision.report
     assert 1.1 * report["expected_before_mm"] < report["expected_after_mm"] < 1.0
     assert any("is the more certain" in notice for notice in report["notices"])
     assert main(["update", "old.calib", "moved.csv", "--json"]) == 0
