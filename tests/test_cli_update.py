@@ -73,6 +73,26 @@ def test_a_p_between_half_the_level_and_the_level_does_not_count(folder):
     assert ta.update(calibration, data, level=2.5 * p).verdict == "field"
 
 
+def test_coarse_rows_of_an_arm_that_did_not_change_do_not_replace_its_calibration(folder, capsys):
+    table, axes = pd.read_csv("same.csv"), ["x", "y", "z"]
+    table[axes] += np.random.default_rng(3).normal(scale=1.5e-4, size=(len(table), 3))
+    table.assign(sigma_mm=0.15).to_csv("coarse.csv", index=False)
+    assert main(["update", "old.calib", "coarse.csv", "-o", "coarse.calib"]) == 0
+    out, err = (" ".join(said.split()) for said in capsys.readouterr())
+    assert "The calibration still holds" in out
+    assert "Nothing moved, and the calibration as it was is the more certain" in err
+    assert "The old calibration is the more certain: keep old.calib." in out
+    assert "--roll-back" not in out
+    revision = ta.Calibration.load("coarse.calib").revision
+    assert revision is not None
+    report = revision.report
+    assert 1.1 * report["expected_before_mm"] < report["expected_after_mm"] < 1.0
+    assert any("is the more certain" in notice for notice in report["notices"])
+    assert main(["update", "old.calib", "moved.csv", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["expected_before_mm"], told["expected_after_mm"]) == (None, None)
+
+
 def test_without_output_nothing_is_written(folder, capsys):
     before = sorted(folder.iterdir())
     assert main(["update", "old.calib", "same.csv"]) == 0

@@ -337,6 +337,21 @@ def test_a_folder_with_brackets_is_no_pattern(tmp_path, pattern):
     assert found == ((folder if pattern == "o*.csv" else tmp_path / "nov") / "oct.csv",)
 
 
+def test_a_single_outlier_is_named_with_the_error_that_it_may_make():
+    spoilt = {**ROW, "rows": 50, "mean_mm": 1.191, "nominal_mean_mm": 5.0, "outliers": 1}
+    spoilt |= {"outliers_named": "row 10 (17.37 mm)", "drift": {**DRIFT, "previous_mean_mm": 0.107}}
+    (found,) = reasons(spoilt, [], LimitsSection())
+    assert found.kind == "worse"
+    assert found.words.endswith("it was 0.107 mm. 1 of 50 rows is an outlier: row 10 (17.37 mm).")
+    assert reasons({**ROW, "outliers": 1}, [], LimitsSection()) == []
+    both = reasons({**spoilt, "outliers": 2}, [], LimitsSection(max_mm=0.2))
+    assert [("row 10" in reason.words, reason.kind) for reason in both] == [
+        (False, "max"),
+        (False, "worse"),
+        (True, "outliers"),
+    ]
+
+
 def test_outliers_are_named_on_the_page_which_may_have_no_report_to_look_into(tmp_path):
     rows = table(1, 0)
     rows.loc[[6, 20], "z"] += 0.05

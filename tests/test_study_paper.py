@@ -152,6 +152,22 @@ def test_command_writes_its_files(tmp_path, monkeypatch, capsys):
     assert "CMAC" in (out / "paper.md").read_text()
 
 
+def test_figures_of_the_first_seed_are_told_as_they_are_made(monkeypatch):
+    monkeypatch.setattr(paper, "RUNS", {name: lambda _: {} for name in PAPER_FIGURES})
+    monkeypatch.setattr(paper, "over_seeds", lambda _: {})
+    told = []
+
+    def stages(name):
+        told.append(name)
+        return nullcontext()
+
+    run([0], ("6", "cmac"), stages)
+    assert told == ["figure 1 of 2", "figure 2 of 2"]
+    told.clear()
+    run([0, 1], ("6",), stages, workers=1)
+    assert told == ["seed 1 of 2", "figure 1 of 1", "seed 2 of 2"]
+
+
 def test_unknown_figures_and_no_seeds_are_refused(tmp_path, capsys):
     with pytest.raises(UsageError, match='no figure "9"'):
         run([0], ["9"], lambda _: nullcontext())

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
 from truearm.certainty.conservative import conservative_of
-from truearm.certainty.uncertainty import AXES as ROWS_TOGETHER
+from truearm.certainty.threes import AXES as ROWS_TOGETHER
 from truearm.certainty.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole

@@ -17,6 +17,16 @@ FIVE_OF_SIX: Final = (
 )
 
 
+def kept_words(before_mm: float, after_mm: float) -> str:
+    """That a calibration which holds is the more certain one as it was, in sentences."""
+    return (
+        "Nothing moved, and the calibration as it was is the more certain: over its own poses, with frame "
+        f"and target found anew, its expected standard deviation is {before_mm:.3f} mm, and {after_mm:.3f} "
+        "mm after the update. Keep it; what these poses tell is worth more in a calibration from old and new "
+        "rows together."
+    )
+
+
 def of_known_world(told: Mapping[str, Any]) -> str:
     """What may look like a field that changed where the world is known, in sentences; "" where it is not.
 

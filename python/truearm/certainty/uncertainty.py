@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import CoreError, Posterior
+from truearm.certainty.successive import Successive
+from truearm.certainty.threes import AXES, in_threes
 from truearm.errors import InputError, WorkError
 from truearm.fits.core_set import core_set
 from truearm.fits.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-AXES: Final = 3
 AT_ONCE: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
@@ -256,12 +257,12 @@ class VariableSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m), exact."""
-        found = self.posterior.joint_covariance(*_in_threes(inputs, jacobian[:, :, self.columns], setup))
+        found = self.posterior.joint_covariance(*in_threes(inputs, jacobian[:, :, self.columns], setup))
         return np.asarray(found * self.inflation**2)
 
     def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """The block (k m, (n - k) m) of `joint`."""
-        asked = _in_threes(inputs, jacobian[:, :, self.columns], setup)
+        asked = in_threes(inputs, jacobian[:, :, self.columns], setup)
         parts = jacobian.shape[1] // AXES
         return np.asarray(self.posterior.cross_covariance(first * parts, *asked) * self.inflation**2)
 
@@ -306,33 +307,33 @@ class UpdatedSpread:
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m)."""
         if self.carried is None:
-            return self.before.covariance(inputs, jacobian, moved) + self._own_each(jacobian @ self.offsets)
+            own = _each(self._own_rows(jacobian, None), self.of_all)
+            return self.before.covariance(inputs, jacobian, moved) + own
         return self.each(inputs, jacobian, self.place.among_all(moved))
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """Covariance (n, m, m), each of its own."""
         if self.carried is None:
-            return self.before.each(inputs, jacobian, None) + self._own_each(
-                self._unknown_to(jacobian, setup)
+            return self.before.each(inputs, jacobian, None) + _each(
+                self._own_rows(jacobian, setup), self.of_all
             )
         found = np.empty((len(jacobian), *jacobian.shape[1:2] * 2))
         for first in range(0, len(jacobian), AT_ONCE):
             some = slice(first, first + AT_ONCE)
             own = None if setup is None else setup[some]
-            found[some] = self._carried_each(self.carried, inputs[some], jacobian[some], own)
+            found[some] = self._carried_each(inputs[some], jacobian[some], own)
         return found
 
-    def _carried_each(
-        self, carried: Carried, inputs: Floats, jacobian: Floats, setup: Floats | None
-    ) -> Floats:
+    def _carried_each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """Covariance (n, m, m) of no more than can be asked for at once."""
-        rows, tied = self._unknown_to(jacobian, setup), _tied(carried, jacobian, setup)
-        taken = rows @ carried.response[: rows.shape[2]]
+        origin, since = self.origin, self.since
+        rows, tied = since.unknown_to(jacobian, setup), since.tied_to(jacobian, setup)
+        taken = rows @ since.response
         parts = jacobian.shape[1] // AXES
-        with_shown = self.before.cross(len(inputs) * parts, *_with_shown(carried, inputs, jacobian, tied))
+        with_shown = origin.cross(len(inputs) * parts, *since.with_shown(inputs, jacobian, tied))
         both = taken @ with_shown.reshape(taken.shape).transpose(0, 2, 1)
-        found = self.before.each(inputs, jacobian, tied) - both - both.transpose(0, 2, 1)
-        return found + taken @ self._shown @ taken.transpose(0, 2, 1) + self._own_each(rows)
+        found = origin.each(inputs, jacobian, tied) - both - both.transpose(0, 2, 1)
+        return found + _each(taken, self._shown) + _each(rows, since.own)
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) before any measurement."""
@@ -340,94 +341,84 @@ class UpdatedSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m)."""
-        rows = self._unknown_to(jacobian, setup)
-        size = rows.shape[2]
-        rows = rows.reshape(-1, size)
-        own = rows @ self._anew[:size, :size] @ rows.T
         if self.carried is None:
-            return self.before.joint(inputs, jacobian) + np.asarray(own)
-        tied = _tied(self.carried, jacobian, setup)
-        then = self.before.joint(*_with_shown(self.carried, inputs, jacobian, tied))
-        taken, count = rows @ self.carried.response[:size], len(rows)
+            rows = _flat(self._own_rows(jacobian, setup))
+            return self.before.joint(inputs, jacobian) + _between(rows, self.of_all, rows)
+        since = self.since
+        rows, tied = _flat(since.unknown_to(jacobian, setup)), since.tied_to(jacobian, setup)
+        then = self.origin.joint(*since.with_shown(inputs, jacobian, tied))
+        taken, count = rows @ since.response, len(rows)
         both = then[:count, count:] @ taken.T
-        return np.asarray(then[:count, :count] - both - both.T + taken @ then[count:, count:] @ taken.T + own)
+        found = then[:count, :count] - both - both.T + _between(taken, then[count:, count:], taken)
+        return np.asarray(found + _between(rows, since.own, rows))
 
     def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """The block (k m, (n - k) m) of `joint`."""
-        rows = self._unknown_to(jacobian, setup)
-        size = rows.shape[2]
-        left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
-        own = left @ self._anew[:size, :size] @ right.T
         if self.carried is None:
-            return self.before.cross(first, inputs, jacobian, None) + np.asarray(own)
-        response, parts = self.carried.response[:size], jacobian.shape[1] // AXES
-        tied = _tied(self.carried, jacobian, setup)
-        mine = self.before.cross(first * parts, *_with_shown(self.carried, inputs, jacobian, tied))
-        others = _with_shown(self.carried, inputs[first:], jacobian[first:], tied[first:])
-        theirs = self.before.cross((len(inputs) - first) * parts, *others)
+            rows = self._own_rows(jacobian, setup)
+            own = _between(_flat(rows[:first]), self.of_all, _flat(rows[first:]))
+            return self.before.cross(first, inputs, jacobian, None) + own
+        since, origin, parts = self.since, self.origin, jacobian.shape[1] // AXES
+        rows, tied = since.unknown_to(jacobian, setup), since.tied_to(jacobian, setup)
+        left, right = _flat(rows[:first]), _flat(rows[first:])
+        mine = origin.cross(first * parts, *since.with_shown(inputs, jacobian, tied))
+        others = since.with_shown(inputs[first:], jacobian[first:], tied[first:])
+        theirs = origin.cross((len(inputs) - first) * parts, *others)
         between, shown = mine[:, : len(right)], mine[:, len(right) :]
-        taken, taken_there = left @ response, right @ response
-        found = between - shown @ taken_there.T - taken @ theirs.T + taken @ self._shown @ taken_there.T
-        return np.asarray(found + own)
+        taken, taken_there = left @ since.response, right @ since.response
+        found = between - shown @ taken_there.T - taken @ theirs.T + _between(taken, self._shown, taken_there)
+        return np.asarray(found + _between(left, since.own, right))
 
-    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
-        """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
+    def _own_rows(self, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Derivatives (n, m, u) by the first u of this update's unknowns: without set-up those of the arm."""
         rows = jacobian @ self.offsets
         return rows if setup is None else np.concatenate([rows, setup], axis=2)
 
-    def _own_each(self, rows: Floats) -> Floats:
-        """Covariance (n, m, m) of rows (n, m, u) by the first u unknowns that the update adds of its own."""
-        size = rows.shape[2]
-        return np.asarray(rows @ self._anew[:size, :size] @ rows.transpose(0, 2, 1))
+    @cached_property
+    def origin(self) -> Spread:
+        """What was uncertain before the first of the updates in `since`."""
+        before = self.before
+        return before.origin if _tells(before) else before
 
-    @property
-    def _anew(self) -> Floats:
-        """Covariance (u + S, u + S) of what was estimated, beside what of the errors before it took up."""
-        return self.of_all if self.carried is None else self.carried.own
+    @cached_property
+    def since(self) -> Successive:
+        """This update, and those before it that tell what became of the errors before, as one."""
+        if self.carried is None:
+            raise WorkError("this update carries nothing", rule="Only what it made of errors before is known")
+        one, before = Successive.one(self.offsets, self.carried), self.before
+        return before.since.then(one) if _tells(before) else one
 
     @cached_property
     def _shown(self) -> Floats:
-        """Covariance (R, R) before the update of what its rows showed."""
-        if self.carried is None:
-            raise WorkError("this update carries nothing", rule="Only what it made of errors before is shown")
-        carried = self.carried
-        return self.before.joint(*_in_threes(carried.inputs, carried.jacobian, carried.setup))
+        """Covariance (3 R, 3 R) before these updates of what their rows showed."""
+        since = self.since
+        return self.origin.joint(since.inputs, since.jacobian, since.setup)
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """As before."""
         return self.before.noise(jacobian, orientation)
 
 
-def _tied(carried: Carried, jacobian: Floats, setup: Floats | None) -> Floats:
-    """Derivatives (n, m, S') by the set-ups of the calibration before, of those (n, m, S) by the new ones."""
-    return np.zeros((*jacobian.shape[:2], carried.tied.shape[1])) if setup is None else setup @ carried.tied
+def _tells(spread: Spread) -> TypeGuard[UpdatedSpread]:
+    """Whether it is of an update that tells what became of the errors before."""
+    return isinstance(spread, UpdatedSpread) and spread.carried is not None
 
 
-def _with_shown(
-    carried: Carried, inputs: Floats, jacobian: Floats, tied: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Inputs and rows, three at a time, and behind them those of the update."""
-    mine, shown = (inputs, jacobian, tied), (carried.inputs, carried.jacobian, carried.setup)
-    at = np.concatenate([_repeated(*part[:2]) for part in (mine, shown)])
-    of_arm, of_setup = (np.concatenate([_threes(mine[k]), _threes(shown[k])]) for k in (1, 2))
-    return at, of_arm, of_setup
+def _each(rows: Floats, covariance: Floats) -> Floats:
+    """Covariance (n, m, m) of rows (n, m, u) by the first u unknowns of a covariance."""
+    size = rows.shape[2]
+    return np.asarray(rows @ covariance[:size, :size] @ rows.transpose(0, 2, 1))
 
 
-def _in_threes(
-    inputs: Floats, jacobian: Floats, setup: Floats | None
-) -> tuple[Floats, Floats, Floats | None]:
-    """Inputs, and rows (n, m, ...) of derivatives, three at a time: m is a multiple of three."""
-    return _repeated(inputs, jacobian), _threes(jacobian), None if setup is None else _threes(setup)
+def _between(left: Floats, covariance: Floats, right: Floats) -> Floats:
+    """Covariance (p, q) of rows (p, u) with others (q, u) by the first u unknowns of a covariance."""
+    size = left.shape[1]
+    return np.asarray(left @ covariance[:size, :size] @ right.T)
 
 
-def _repeated(inputs: Floats, jacobian: Floats) -> Floats:
-    """Inputs (n, I), once for every three rows (n, m, ...)."""
-    return np.repeat(inputs, jacobian.shape[1] // AXES, axis=0)
-
-
-def _threes(rows: Floats) -> Floats:
-    """Rows (n, m, k) three at a time, (n m / 3, 3, k)."""
-    return np.ascontiguousarray(rows.reshape(-1, AXES, rows.shape[2]))
+def _flat(rows: Floats) -> Floats:
+    """Rows (n m, u) of those (n, m, u)."""
+    return rows.reshape(-1, rows.shape[2])
 
 
 def noises_of(hyper: Mapping[str, Sequence[float]]) -> tuple[float, float]:

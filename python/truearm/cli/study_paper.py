@@ -35,7 +35,7 @@ def command(
     quantiles over the seeds), DIR/paper.md (what the paper states beside what comes out, and the readings
     chosen), and the panels of the first seed as PNG and SVG.
 
-    Twenty seeds take less than half an hour on two cores, one takes a minute or two.
+    Twenty seeds take less than half an hour on two cores, one takes some minutes.
 
     Examples:
       truearm study paper -o study --seeds 1 --figure 6

@@ -168,6 +168,9 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
         anew = calibrate_anew(known)
         say_wrapped(" ".join((FROM_NEW_ROWS, *anew.notes)))
         suggest(plan_anew(known), anew.command, when="Measure anew:")
+    elif found.is_less_certain:
+        say_wrapped(f"The old calibration is the more certain: keep {typed(old)}.")
+        suggest(*(compensate_commands(known, old) or [f"truearm report {typed(old)}"]))
     elif place is not None:
         suggest(f"truearm update --roll-back {typed(place)} -o OLD.calib", when="Back to the old one:")
     elif found.verdict == "moved":

@@ -1,7 +1,7 @@
 """What of an arm's results needs attention, and the verdict in one sentence."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -62,6 +62,10 @@ KINDS: Final = (
 """The worst first."""
 
 
+SPOILT: Final = ("no_gain", "drift", "mean", "max", "worse", "stands_out")
+"""What a gross row can make of an arm that is as it was."""
+
+
 def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reason]:
     """Why an arm needs attention, the worst first; nothing where it does not.
 
@@ -81,7 +85,7 @@ def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reaso
         *_stands_out(arm, fleet),
     ]
     found += [*_worse(arm, limits), *_outliers(arm), *_intervals(arm)]
-    return sorted(found, key=lambda reason: KINDS.index(reason.kind))
+    return _with_outliers(arm, sorted(found, key=lambda reason: KINDS.index(reason.kind)))
 
 
 def _earlier(arm: Row) -> str:
@@ -206,8 +210,24 @@ def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:
 def _outliers(arm: Row) -> Iterator[Reason]:
     share = arm["outliers"] / arm["rows"]
     if share > MOST_OUTLIERS:
-        named = f": {arm['outliers_named']}" if arm.get("outliers_named") else ""
-        yield Reason("outliers", f"{arm['outliers']} of {arm['rows']} rows are outliers{named}.", share)
+        yield Reason("outliers", _outlier_words(arm), share)
+
+
+def _outlier_words(arm: Row) -> str:
+    named = f": {arm['outliers_named']}" if arm.get("outliers_named") else ""
+    are = "is an outlier" if arm["outliers"] == 1 else "are outliers"
+    return f"{arm['outliers']} of {arm['rows']} rows {are}{named}."
+
+
+def _with_outliers(arm: Row, found: list[Reason]) -> list[Reason]:
+    """Outliers too few for a reason of their own, told with the first of the errors that they may make."""
+    if not arm["outliers"] or any(reason.kind == "outliers" for reason in found):
+        return found
+    place = next((k for k, reason in enumerate(found) if reason.kind in SPOILT), None)
+    if place is not None:
+        spoilt = found[place]
+        found[place] = replace(spoilt, words=f"{spoilt.words} {_outlier_words(arm)}")
+    return found
 
 
 def _intervals(arm: Row) -> Iterator[Reason]:

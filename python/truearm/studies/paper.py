@@ -1,7 +1,7 @@
 """The paper's simulations, section 6: each figure for one seed, and all of them over seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
@@ -34,6 +34,7 @@ from truearm.studies.setting import (
     READINGS,
     SPHERE_REGIONS,
     Kind,
+    Reading,
     path_of,
     straight,
 )
@@ -132,7 +133,7 @@ def run(
         raise UsageError(what, rule=f"Figures are {', '.join(PAPER_FIGURES)}; at least one seed is needed")
     check_workers(scheduler, workers)
     kept: dict[str, Kept] = {}
-    with stages(f"seed 1 of {len(seeds)}"):
+    with stages(f"seed 1 of {len(seeds)}") if len(seeds) > 1 else nullcontext():
         first = Seed(seeds[0], kept, stages)
         found = {0: _each(first, figures)}
     others = [(number, kept, tuple(figures)) for number in seeds[1:]]
@@ -146,7 +147,11 @@ def run(
 
 
 def _each(seed: Seed, figures: Sequence[str]) -> Result:
-    return {key: part for name in figures for key, part in RUNS[name](seed).items()}
+    result: Result = {}
+    for number, name in enumerate(figures, start=1):
+        with seed.stages(f"figure {number} of {len(figures)}"):
+            result |= RUNS[name](seed)
+    return result
 
 
 def _elsewhere(item: tuple[int, dict[str, Kept], tuple[str, ...]]) -> Result:
@@ -158,14 +163,20 @@ def figure6(seed: Seed) -> Result:
     """Division of joint space, and all readings of the errors."""
     result = _figure(seed, "figure6", seed.joint, seed.joint_schemes)
     readings = {}
-    for reading in READINGS:
-        stopped = conduct(seed.number, Plan("joint", None, reading=reading))
-        part: Result = {"stops_at": {"regions": len(stopped.regions.leaves), "measured": stopped.measured}}
-        for noisy in (False, True):
-            made = conduct(seed.number, Plan("joint", JOINT_REGIONS, noisy, reading))
-            part["noise" if noisy else "clean"] = _judged(made, basic_schemes(made), _paper_path(made))
-        readings[reading.name] = part
+    for number, reading in enumerate(READINGS, start=1):
+        with seed.stages(f"reading {number} of {len(READINGS)}"):
+            readings[reading.name] = _as_read(seed, reading)
     return {"figure6": result, "readings": readings}
+
+
+def _as_read(seed: Seed, reading: Reading) -> Result:
+    """Where division stops with a reading of the errors, and what schemes leave in the paper's regions."""
+    stopped = conduct(seed.number, Plan("joint", None, reading=reading))
+    part: Result = {"stops_at": {"regions": len(stopped.regions.leaves), "measured": stopped.measured}}
+    for noisy in (False, True):
+        made = conduct(seed.number, Plan("joint", JOINT_REGIONS, noisy, reading))
+        part["noise" if noisy else "clean"] = _judged(made, basic_schemes(made), _paper_path(made))
+    return part
 
 
 def figure7(seed: Seed) -> Result:
@@ -233,10 +244,11 @@ def cmac(seed: Seed) -> Result:
     }
     result = _judged(made, schemes, readings)
     sensitivity: Result = {}
-    for name, change in SENSITIVITY.items():
+    for number, (name, change) in enumerate(SENSITIVITY.items(), start=1):
         network = {key: change.get(key, value) for key, value in NETWORK.items()}
         training = {key: change.get(key, value) for key, value in TRAINING.items()}
-        scheme = trained_network(made, constant, ceps, network, training)
+        with seed.stages(f"network {number} of {len(SENSITIVITY)}"):
+            scheme = trained_network(made, constant, ceps, network, training)
         sensitivity |= {name: {**_judged(made, {name: scheme}, readings)[name], "training": scheme.notes}}
     seed.drawn["cmac"] = _draw(made, readings, schemes)
     return {"cmac": {**result, "sensitivity": sensitivity}}

@@ -32,6 +32,7 @@ from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
 from truearm.update_words import way_out_of_keeping
+from truearm.updating.certainty import expected_mm, less_certain
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
@@ -42,7 +43,7 @@ from truearm.updating.scene import Scene, State
 from truearm.updating.some_poses import some_poses
 from truearm.updating.squares import SquaresTest, change_test, rest_test
 from truearm.updating.unknowns import Unknowns
-from truearm.updating.updated import updated
+from truearm.updating.updated import noted, updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
 
 Verdict = Literal["holds", "moved", "field"]
@@ -77,6 +78,9 @@ class Update:
         n_poses: Poses that were used, outliers among them.
         outliers: Data rows that were left out.
         notices: What the user should know.
+        expected_mm: Where the old calibration holds, its expected standard deviation over the poses that it
+            was learned from, and that of the updated one, of what frame and target, found anew, do not take
+            over; root of the sum of squares of x, y and z. None where it does not hold.
     """
 
     calibration: Calibration
@@ -92,6 +96,7 @@ class Update:
     n_poses: int
     outliers: tuple[int, ...]
     notices: tuple[Notice, ...] = ()
+    expected_mm: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         poses, outliers = count_of(self.n_poses, "pose"), count_of(len(self.outliers), "outlier")
@@ -127,6 +132,15 @@ class Update:
         """What says where the arm stands: "frame", or in a known world "base"."""
         return "base" if self.calibration.arm.world_is_known else "frame"
 
+    @property
+    def is_less_certain(self) -> bool:
+        """Whether the old calibration is to be kept: it holds, and is clearly the more certain of the two."""
+        return bool(less_certain(self.expected_mm))
+
+    def _expected(self) -> dict[str, float | None]:
+        before, after = self.expected_mm or (None, None)
+        return {"expected_before_mm": before, "expected_after_mm": after}
+
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration."""
         return {
@@ -144,6 +158,7 @@ class Update:
             "rest": self.rest.to_dict(),
             "before": self.before.to_dict(),
             "after": self.after.to_dict(),
+            **self._expected(),
             "notices": in_words(self.notices),
         }
 
@@ -263,8 +278,16 @@ class _Found:
             notices=notices,
         )
         report = {**told.to_dict(), "options": asdict(self.options)}
-        new = updated(kept, found, judged, report, notices)
+        return _with_certainty(told, updated(kept, found, judged, report, notices))
+
+
+def _with_certainty(told: Update, new: Calibration) -> Update:
+    """What the measurements say, of the updated calibration, and which of the two is the more certain."""
+    if told.verdict != "holds":
         return replace(told, calibration=new)
+    expected = expected_mm(told.calibration, new)
+    told = replace(told, expected_mm=expected, notices=(*told.notices, *less_certain(expected)))
+    return replace(told, calibration=noted(new, told.to_dict(), told.notices))
 
 
 def _threshold(level: float) -> float:

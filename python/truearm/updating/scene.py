@@ -169,7 +169,7 @@ class Scene:
             self.inputs, self.arm_jacobian(state), self.tied_jacobian(state)
         )
         anew, seen = self.linear(state).jacobian[:, self.unknowns.anew], self.seen.reshape(-1)
-        return _without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
+        return without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
 
     def scatter(self, state: State) -> Floats:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
@@ -274,7 +274,7 @@ def motion_between(before: Floats, after: Floats) -> Floats:
     return np.concatenate([between[:3, 3], rotation_vector_from_matrix(between[:3, :3])])
 
 
-def _without(covariance: Floats, columns: Floats) -> Floats:
+def without(covariance: Floats, columns: Floats) -> Floats:
     """A covariance (R, R) without its parts along the columns (R, k)."""
     if columns.shape[1] == 0:
         return covariance

@@ -93,6 +93,15 @@ def updated(
     return replace(new, fitted_spread=UpdatedSpread.of(new, calibration.spread))
 
 
+def noted(new: Calibration, told: Mapping[str, Any], notices: tuple[Notice, ...]) -> Calibration:
+    """An updated calibration with what is said of it once it is there, and all its notices."""
+    revision = new.revision
+    if revision is None:
+        return new
+    said = replace(revision, report={**revision.report, **told, "notices": in_words(notices)})
+    return replace(new, notices=notices, revision=said)
+
+
 def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, change: Floats) -> ArmModel:
     """A model in the new set-ups; those of others than the one that predicts are fitted to the same rows."""
     old = calibration.models[name]
