@@ -32,7 +32,7 @@ def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
 
 
 def _missed_anew(task: Task, fit: FieldFit, rows: Measurements, point: Floats) -> float:
-    """What joints miss anew of a point (3,) of the flange: variances of rows and coordinates added up, m^2."""
+    """What joints miss anew of a point (3,) of the flange: variances of rows and coordinates, added, m^2."""
     end = np.eye(4)
     end[:AXES, 3] = point
     chain = task.arm.chain(task.arm.robot.flange @ end)
