@@ -196,8 +196,6 @@ def test_a_set_up_that_was_planned_to_validate_as_a_whole_is_told_so():
     with pytest.raises(InputError, match='set-up "b" trains.*marked "validate".*mark some "train"') as raised:
         split_rows(data, SplitRule())
     assert "smaller" not in str(raised.value)
-    with pytest.raises(InputError, match="smaller --holdout"):
-        split_rows(data, SplitRule(holdout=0.98))
 
 
 def test_poses_that_were_planned_to_validate_are_held_out():
