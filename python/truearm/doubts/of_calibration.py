@@ -171,7 +171,9 @@ def _of_errors(
     points = None if found.selection.distances else found.held
     models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
     return [
-        *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
+        *zero_notices(
+            task, data, [found.models[name] for name in (NOMINAL, CONSTANT)], found.identifiability.determined
+        ),
         *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data, judged, best, points, outliers),
         *constant_is_better(judged, best, points, outliers),
