@@ -184,9 +184,9 @@ def _notice(wires: Sequence[Wire], zero: Zero) -> Notice:
     length = f"{MM_PER_METRE * abs(zero.length_m):.4g} mm"
     too, how = ("long", f"Subtract {length} from") if zero.length_m > 0.0 else ("short", f"Add {length} to")
     text = (
-        f'The {count_of(count, "distance")} to {list_names(anchors)} seem to be {length} too {too}, give or '
-        f"take {std:.2g} mm: without that they miss the arm by {after:.3g} mm in place of {before:.3g} mm, root "
-        "mean square. A wire has to be counted from the point that it leads to, not from where it was "
+        f"The {count_of(count, 'distance')} to {list_names(anchors)} seem to be {length} too {too}, give or "
+        f"take {std:.2g} mm: without that they miss the arm by {after:.3g} mm in place of {before:.3g} mm, "
+        "root mean square. A wire has to be counted from the point that it leads to, not from where it was "
         f"switched on. {how} these distances and calibrate again."
     )
     return Notice(DISTANCE_ZERO, text)
