@@ -47,6 +47,39 @@ def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
     assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
 
 
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("z", 1e-3, "if the z coordinate is 1000 times what was read (metres taken for mm)"),
+        ("y", 1.0 / 25.4, "if the y coordinate is 25.4 times what was read (inches taken for mm)"),
+        ("q3", np.pi / 180.0, "joint 3 is 57.3 times what was read (radians taken for degrees)"),
+    ],
+)
+def test_a_column_in_another_unit_is_named(tmp_path, column, factor, words):
+    """Of an arm of few joints, of which all conventions are soon tried."""
+    links = [
+        ("revolute", 0.4, 0.1, -90, 170),
+        ("prismatic", 0.3, 0, 90, 0.8),
+        ("revolute", 0.2, 0.3, -90, 170),
+        ("revolute", 0.1, 0.2, 90, 170),
+    ]
+    rows = [
+        f'[[link]]\njoint = "{joint}"\nd = {d}\na = {a}\nalpha = {alpha}\nlimits = [{-limit}, {limit}]\n'
+        for joint, d, a, alpha, limit in links
+    ]
+    head = 'name = "four"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    (tmp_path / "four.toml").write_text(head + "".join(rows))
+    arm = VirtualArm(ta.Robot.load(tmp_path / "four.toml"), seed=4)
+    table = arm.measure_table(arm.poses(36))
+    table[column] *= factor
+    data = ta.Measurements.from_dataframe(table, joints=arm.robot.joints)
+    found = ta.calibrate(arm.robot, data, model="constant", refit=False)
+    said = notice_of(found, "fits_otherwise")
+    assert words in said
+    assert "They fit as well" not in said
+    assert notice_of(found, "far_from_nominal") == ""
+
+
 def named_otherwise(name, **otherwise):
     robot, data = measured_otherwise(name, **otherwise)
     return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")

@@ -141,7 +141,11 @@ def _doubted(
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
     if not framed and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
-            doubted[1:1] = fits_otherwise(task, data)
+            otherwise = fits_otherwise(task, data)
+        if otherwise:
+            # What takes parameters far from nominal is known then, and is no other robot.
+            doubted = [notice for notice in doubted if notice.kind != FAR_FROM_NOMINAL]
+        doubted[1:1] = otherwise
     return [*exchanged.notices, *doubted], exchanged.unbent
 
 
