@@ -109,4 +109,4 @@ def found_together(
         return None
     noise = float(residuals @ residuals) / freedom
     missed = np.sqrt((own @ np.square(residuals)) / own.sum(axis=1))
-    return Lengths(lengths, noise * np.linalg.inv(counted), missed)
+    return Lengths(lengths, np.asarray(noise * np.linalg.inv(counted), dtype=np.float64), missed)

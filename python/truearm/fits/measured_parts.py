@@ -126,7 +126,7 @@ class MeasuredParts:
 
 def _first_of_most(worth: Floats, groups: Sequence[str]) -> int:
     """Number of the set-up that is worth most, of those that are worth the same the first by name."""
-    alike = np.flatnonzero(worth >= (1.0 - SAME_WORTH) * worth.max())
+    alike = np.flatnonzero(worth >= (1.0 - SAME_WORTH) * worth.max()).tolist()
     return int(min(alike, key=lambda number: groups[number]))
 
 
