@@ -47,6 +47,57 @@ def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
     assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
 
 
+@pytest.fixture(scope="module")
+def few_joints(tmp_path_factory):
+    """An arm of few joints, of which all conventions are soon tried."""
+    links = [
+        ("revolute", 0.4, 0.1, -90, 170),
+        ("prismatic", 0.3, 0, 90, 0.8),
+        ("revolute", 0.2, 0.3, -90, 170),
+        ("revolute", 0.1, 0.2, 90, 170),
+    ]
+    rows = [
+        f'[[link]]\njoint = "{joint}"\nd = {d}\na = {a}\nalpha = {alpha}\nlimits = [{-limit}, {limit}]\n'
+        for joint, d, a, alpha, limit in links
+    ]
+    head = 'name = "four"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    file = tmp_path_factory.mktemp("arm") / "four.toml"
+    file.write_text(head + "".join(rows))
+    return VirtualArm(ta.Robot.load(file), seed=4)
+
+
+def told_of(arm, table):
+    """What is said of a calibration from a table."""
+    data = ta.Measurements.from_dataframe(table, joints=arm.robot.joints)
+    return ta.calibrate(arm.robot, data, model="constant", refit=False)
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("z", 1e-3, "if the z coordinate is 1000 times what was read (metres taken for mm)"),
+        ("y", 1.0 / 25.4, "if the y coordinate is 25.4 times what was read (inches taken for mm)"),
+        ("q3", np.pi / 180.0, "joint 3 is 57.3 times what was read (radians taken for degrees)"),
+    ],
+)
+def test_a_column_in_another_unit_is_named(few_joints, column, factor, words):
+    table = few_joints.measure_table(few_joints.poses(36))
+    table[column] *= factor
+    found = told_of(few_joints, table)
+    said = notice_of(found, "fits_otherwise")
+    assert words in said
+    assert "They fit as well" not in said
+    assert notice_of(found, "far_from_nominal") == ""
+
+
+@pytest.mark.parametrize(("rows", "words"), [(slice(30, 50), "from row 31 on"), (slice(25), "up to row 25")])
+def test_a_joint_that_changes_its_sign_is_named_with_the_row(few_joints, rows, words):
+    table = few_joints.measure_table(few_joints.poses(50))
+    table.loc[table.index[rows], "q3"] *= -1.0
+    said = notice_of(told_of(few_joints, table), "fits_otherwise")
+    assert f"if joint 3 is counted the other way {words}" in said, said
+
+
 def named_otherwise(name, **otherwise):
     robot, data = measured_otherwise(name, **otherwise)
     return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")

@@ -13,6 +13,41 @@ from truearm.simulation import VirtualArm
 ANCHOR = np.array([0.9, -0.6, 0.2])
 
 
+def wires(lengths_m, each=30, seed=3):
+    """Distances to fixed points, in turn, that are so much longer than they are."""
+    arm = VirtualArm(ta.Robot.load("ur5e"), seed=seed)
+    table = arm.measure_table(arm.poses(each * len(lengths_m)))
+    place = np.arange(len(table)) % len(lengths_m)
+    anchors = ANCHOR * np.array([[1, 1, 1], [-1, 1, 2], [1, -1, 3]])[place]
+    away = np.linalg.norm(table[["x", "y", "z"]] - table[["x", "y", "z"]].mean() - anchors, axis=1)
+    joints = table[[f"q{k}" for k in range(1, 7)]]
+    names = np.array(["a", "b", "c"])[place]
+    return ta.Measurements.from_dataframe(
+        joints.assign(anchor=names, distance=away + np.take(lengths_m, place))
+    )
+
+
+def lengths_told(data):
+    """Anchors with the length that is told of them and its standard error, mm."""
+    found = ta.calibrate(ta.Robot.load("ur5e"), data, model="constant")
+    pattern = r"distances to (.*) seem to be ([\d.]+) mm too (long|short), give or take ([\d.]+) mm"
+    told = [re.search(pattern, note.message) for note in found.notices if note.kind == "distance_zero"]
+    return [(m[1], float(m[2]) * (1 if m[3] == "long" else -1), float(m[4])) for m in told if m]
+
+
+def test_a_length_that_several_anchors_share_is_told_once_and_right():
+    ((anchors, length, error),) = lengths_told(wires([-0.05] * 3))
+    assert anchors == '"a", "b" and "c"'
+    assert abs(length + 50.0) < 3.0 * error < 3.0
+
+
+def test_lengths_that_differ_are_told_each_and_do_not_bend_one_another():
+    told = lengths_told(wires([0.08, -0.05, 0.0]))
+    assert [anchors for anchors, *_ in told] == ['"a"', '"b"']
+    for (_, length, error), true in zip(told, (80.0, -50.0), strict=True):
+        assert abs(length - true) < 3.0 * error < 6.0
+
+
 def wire(length_m, count=80, seed=5):
     """Distances to one fixed point that are `length_m` longer than they are."""
     arm = VirtualArm(ta.Robot.load("ur5e"), seed=seed)

@@ -190,6 +190,14 @@ def planned(count, every=5, **more):
     return measured(count, purpose=["validate" if k % every == 0 else "train" for k in range(count)], **more)
 
 
+def test_a_set_up_that_was_planned_to_validate_as_a_whole_is_told_so():
+    group, purpose = np.repeat(["a", "b"], [20, 10]), np.repeat(["train", "validate"], [20, 10])
+    data = measured(30, group=list(group), purpose=list(purpose))
+    with pytest.raises(InputError, match='set-up "b" trains.*marked "validate".*mark some "train"') as raised:
+        split_rows(data, SplitRule())
+    assert "smaller" not in str(raised.value)
+
+
 def test_poses_that_were_planned_to_validate_are_held_out():
     data = planned(50)
     assert data.notices == ()

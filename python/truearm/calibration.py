@@ -281,10 +281,10 @@ class Calibration:
         """Standard deviation of each coordinate that `position` gives for the same arguments, (n, 3), m.
 
         Along the axes of the base frame, or with a group or a target along those of its world. It holds for
-        base and tool as the device saw them in the set-up with most rows. Where the arm's own base and flange
-        are, no measurement of a target tells; work objects and tools found through the calibrated arm take it
-        over. Noise of a measurement is no part, but of a model with constants alone all is that they leave
-        beside the rows' own sigma: noise that is not stated, they cannot tell apart.
+        base and tool as the device saw them in the set-up with the surest rows. Where the arm's own base and
+        flange are, no measurement of a target tells; work objects and tools found through the calibrated arm
+        take it over. Noise of a measurement is no part, but of a model with constants alone all is that they
+        leave beside the rows' own sigma: noise that is not stated, they cannot tell apart.
         """
         return self._std(q, self._endpoint(tool, group, target), features, pose=False)
 

@@ -44,7 +44,7 @@ class Spread(Protocol):
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
 
         With `moved` (n, m, 9 or 12), derivatives by motions of base and tool as in SetupPlace, it is that of
-        what the device of the set-up with most rows sees: what frame and target can take over counts no more.
+        what the device of the surest set-up sees: what frame and target can take over counts no more.
         """
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
@@ -75,7 +75,7 @@ class SetupPlace:
         motion: Motion (12, S) of the base (translation, rotation vector), of the tool (translation in the
             flange's frame, that of the middle of the targets, each as much as its rows are sure) and of the
             measured orientation (rotation vector in the target's frame) with them; zero where nothing was
-            fitted. It is that of the set-up with most rows.
+            fitted. It is that of the set-up with the surest rows, added up.
         turning: The same of the set-up with most orientations, for how a target is turned.
     """
 
@@ -84,10 +84,9 @@ class SetupPlace:
 
     @classmethod
     def of(cls, task: Task, measured: MeasuredParts) -> "SetupPlace":
-        """Of the set-ups with most rows and most orientations, or the first where the file does not say."""
-        often = int(measured.rows.argmax())
-        turned = int(measured.orientations.argmax()) if measured.orientations.any() else often
-        return cls(_motion(task, measured, often), _motion(task, measured, turned))
+        """Of the set-ups with the surest rows and with most orientations, whatever the order of the rows."""
+        surest, turned = measured.surest(task.groups), measured.most_turned(task.groups)
+        return cls(_motion(task, measured, surest), _motion(task, measured, turned))
 
     def among_all(self, moved: Floats | None) -> Floats | None:
         """Derivatives (n, m, S) by all of them, of those (n, m, k) by the first k motions."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.description.robot_data import Convention as Rows
+from truearm.doubts.column_units import ColumnUnit, column_units
 from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.doubts.of_results import FITS_OTHERWISE
 from truearm.errors import Notice, count_of
@@ -56,6 +57,7 @@ class Convention:
         signs: Links, from 0, with the place of a parameter in their row that has the other sign.
         other_rows: Whether the rows are of the other one of the two Denavit-Hartenberg conventions.
         exchanged: Two joints, from 0, whose readings stand in each other's column.
+        unit: The column that stands in another unit than the others, if one does.
     """
 
     turned: tuple[int, ...] = ()
@@ -65,11 +67,12 @@ class Convention:
     signs: tuple[tuple[int, int], ...] = ()
     other_rows: bool = False
     exchanged: tuple[int, ...] = ()
+    unit: ColumnUnit | None = None
 
     @property
     def changes(self) -> int:
         """In how much it differs from what robot file and measurements say."""
-        of_rows = len(self.signs) + self.other_rows + bool(self.exchanged)
+        of_rows = len(self.signs) + self.other_rows + bool(self.exchanged) + (self.unit is not None)
         return len(self.turned) + (self.coupled is not None) + self.mirrored + len(self.zeros) + of_rows
 
     @property
@@ -115,6 +118,8 @@ class Convention:
             readings = seen.readings.copy()
             readings[:, self.exchanged] = seen.readings[:, self.exchanged[::-1]]
             seen = replace(seen, readings=readings)
+        if self.unit is not None:
+            seen = self.unit.measured(seen)
         return replace(seen, points=seen.points * MIRROR) if self.mirrored else seen
 
     def words(self, robot: Robot) -> str:
@@ -145,6 +150,8 @@ class Convention:
         if self.exchanged:
             one, other = (joint + 1 for joint in self.exchanged)
             parts.append(f"the columns of joints {one} and {other} are exchanged")
+        if self.unit is not None:
+            parts.append(self.unit.words)
         if self.mirrored:
             parts.append("the device's frame is left-handed (one axis reversed, or two exchanged)")
         return ", and ".join(parts)
@@ -262,6 +269,7 @@ def _of_rows(robot: Robot) -> Iterator[Convention]:
     ]
     for count in range(1, MOST_BESIDE + 1):
         yield from (Convention(signs=signs) for signs in combinations(signed, count))
+    yield from (Convention(unit=unit) for unit in column_units(robot))
     for joints in combinations(range(robot.joint_count), 2):
         if robot.joints[joints[0]] == robot.joints[joints[1]]:
             yield Convention(exchanged=joints)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import CoreError, Setup, fit_constant
-from truearm.errors import Notice, count_of
+from truearm.doubts.zeros_together import found_together
+from truearm.errors import Notice, count_of, list_names
 from truearm.fits.core_set import anchor_names, core_set
 from truearm.fits.fitting import Task, fit_options
 from truearm.fits.models import ArmModel
@@ -16,12 +17,15 @@ from truearm.measurements import Measurements
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 DISTANCE_ZERO: Final = "distance_zero"
 EXPLAINED: Final = 0.7
 """A length that leaves a smaller part of what is missed is no chance."""
 SURE: Final = 5.0
 """Standard errors that such a length has to be."""
+CONFIRMED: Final = 2.0
+"""Standard errors that it has to be where constants, which may look like it, are found beside it."""
 UNKNOWNS: Final = 7
 """Where the fixed point and the target are, and the length."""
 FIRST_M: Final = 1e-3
@@ -53,24 +57,80 @@ class Zero:
         """Whether distances with this length taken out surely fit the arm better."""
         return self.after_m < EXPLAINED * self.before_m and abs(self.length_m) > SURE * self.std_m
 
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether a length that surely fits is none that constants explain as well."""
+        return abs(self.length_m) > CONFIRMED * self.std_m
 
-def zero_notices(task: Task, data: Measurements, models: Sequence[ArmModel]) -> list[Notice]:
-    """Warnings where distances to one anchor fit the arm once one length is subtracted.
 
-    Constants may have taken a part of that length over: it is told by that of the models it fits best.
+@dataclass(frozen=True, eq=False)
+class Wire:
+    """Distances of one set-up to one anchor, with the length they are off by if all others are right.
+
+    Attributes:
+        anchor: Its name.
+        rows: Which rows hold them (n,).
+        zero: That length; None where none makes them fit.
+    """
+
+    anchor: str
+    rows: Mask
+    zero: Zero | None
+
+    @property
+    def sure(self) -> Zero | None:
+        """That length, where there surely is one."""
+        return self.zero if self.zero is not None and self.zero.is_sure else None
+
+
+def zero_notices(
+    task: Task, data: Measurements, models: Sequence[ArmModel], determined: Sequence[str]
+) -> list[Notice]:
+    """Warnings where distances to an anchor fit the arm once one length is subtracted.
+
+    Whether there is one is asked of each anchor for itself, by that of the models that it fits best. Lengths
+    bend models, and what others are told with them: how long they are is found for all in one fit.
+
+    Args:
+        task: What was fitted.
+        data: Its rows.
+        models: What was fitted to them.
+        determined: Names of the constants that they determine.
     """
     if data.anchor is None or data.distance_m is None or not task.selection.distances:
         return []
-    found = []
+    wires = list[Wire]()
     for number, anchor in enumerate(anchor_names(data)):
         for index, group in enumerate(task.groups):
-            rows = data.select((data.anchor == anchor) & (data.group == group) & np.isfinite(data.distance_m))
-            if len(rows) >= FEWEST:
-                zeros = (_zero(task, rows, model, (index, number)) for model in models)
+            rows = (data.anchor == anchor) & (data.group == group) & np.isfinite(data.distance_m)
+            if rows.sum() >= FEWEST:
+                zeros = (_zero(task, data.select(rows), model, (index, number)) for model in models)
                 known = (zero for zero in zeros if zero is not None)
-                zero = min(known, key=lambda each: each.after_m, default=None)
-                found += [_notice(anchor, zero, len(rows))] if zero is not None and zero.is_sure else []
-    return found
+                wires.append(Wire(anchor, rows, min(known, key=lambda each: each.after_m, default=None)))
+    return _notices(task, data, wires, determined)
+
+
+def _notices(
+    task: Task, data: Measurements, wires: Sequence[Wire], determined: Sequence[str]
+) -> list[Notice]:
+    """One of all wires that are off by the same length, or one of each that is off."""
+    sure = [number for number, wire in enumerate(wires) if wire.sure is not None]
+    if not sure:
+        return []
+    first = np.array([0.0 if wire.sure is None else wire.sure.length_m for wire in wires])
+    found = found_together(task, data, [wire.rows for wire in wires], first, determined)
+    off = [wires[number] for number in sure]
+    if found is None:
+        return [_notice([wire], wire.sure) for wire in off if wire.sure is not None]
+    found = found.of(sure)
+    before = np.array([wire.sure.before_m for wire in off if wire.sure is not None])
+    if found.common is not None:
+        counts = [wire.rows.sum() for wire in off]
+        missed = (float(np.sqrt(np.average(each**2, weights=counts))) for each in (before, found.left_m))
+        return [_notice(off, Zero(*found.common, *missed))]
+    parts = zip(found.length_m, np.sqrt(np.diag(found.covariance)), before, found.left_m, strict=True)
+    zeros = [Zero(*map(float, each)) for each in parts]
+    return [_notice([wire], zero) for wire, zero in zip(off, zeros, strict=True) if zero.is_confirmed]
 
 
 def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int]) -> Zero | None:
@@ -117,14 +177,16 @@ def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int
     return Zero(length, float(noise / np.sqrt(counted)), before_m, after_m)
 
 
-def _notice(anchor: str, zero: Zero, count: int) -> Notice:
+def _notice(wires: Sequence[Wire], zero: Zero) -> Notice:
+    """The warning of the distances of some wires."""
+    count, anchors = int(sum(wire.rows.sum() for wire in wires)), [wire.anchor for wire in wires]
     before, after, std = (MM_PER_METRE * each for each in (zero.before_m, zero.after_m, zero.std_m))
     length = f"{MM_PER_METRE * abs(zero.length_m):.4g} mm"
     too, how = ("long", f"Subtract {length} from") if zero.length_m > 0.0 else ("short", f"Add {length} to")
     text = (
-        f'The {count_of(count, "distance")} to "{anchor}" seem to be {length} too {too}, give or take '
-        f"{std:.2g} mm: without that they miss the arm by {after:.3g} mm in place of {before:.3g} mm, root "
-        "mean square. A wire has to be counted from the point that it leads to, not from where it was "
+        f"The {count_of(count, 'distance')} to {list_names(anchors)} seem to be {length} too {too}, give or "
+        f"take {std:.2g} mm: without that they miss the arm by {after:.3g} mm in place of {before:.3g} mm, "
+        "root mean square. A wire has to be counted from the point that it leads to, not from where it was "
         f"switched on. {how} these distances and calibrate again."
     )
     return Notice(DISTANCE_ZERO, text)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import constant_details
-from truearm.doubts.conventions import fits_otherwise
+from truearm.doubts.conventions import BETTER, NEAR_M, fits_otherwise
 from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
 from truearm.doubts.known_world import another_frame
@@ -28,6 +28,7 @@ from truearm.doubts.of_results import (
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, Outliers
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.turned_later import turned_later
 from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.whitened import Whitened
@@ -141,7 +142,11 @@ def _doubted(
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
     if not framed and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
-            doubted[1:1] = fits_otherwise(task, data)
+            otherwise = fits_otherwise(task, data) or turned_later(task, data, BETTER, NEAR_M)
+        if otherwise:
+            # What takes parameters far from nominal is known then, and is no other robot.
+            doubted = [notice for notice in doubted if notice.kind != FAR_FROM_NOMINAL]
+        doubted[1:1] = otherwise
     return [*exchanged.notices, *doubted], exchanged.unbent
 
 
@@ -171,7 +176,9 @@ def _of_errors(
     points = None if found.selection.distances else found.held
     models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
     return [
-        *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
+        *zero_notices(
+            task, data, [found.models[name] for name in (NOMINAL, CONSTANT)], found.identifiability.determined
+        ),
         *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data, judged, best, points, outliers),
         *constant_is_better(judged, best, points, outliers),

@@ -18,6 +18,8 @@ Mask = NDArray[np.bool_]
 
 LEAST_LEFT_M: Final = 1e-9
 """No row is known better than this."""
+SAME_WORTH: Final = 1e-6
+"""Part of what rows are worth below which sums in another order, and searches, differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,15 @@ class MeasuredParts:
         targets = tuple(held) or fitted.targets[:1]
         return replace(fitted, targets=targets, orientation=bool(self.orientations[group]))
 
+    def surest(self, groups: Sequence[str]) -> int:
+        """Number of the set-up whose rows are worth most, of equal ones the first by name."""
+        return _first_of_most(self.worth.sum(axis=1), groups)
+
+    def most_turned(self, groups: Sequence[str]) -> int:
+        """Number of the set-up with most orientations, of equal ones the surest; without any the surest."""
+        most = self.orientations == self.orientations.max()
+        return _first_of_most(np.where(most, self.worth.sum(axis=1), -1.0), groups)
+
     def points(self, targets: Floats) -> Floats:
         """Of points (G, t, 3) on the flange those that were measured (k, 3)."""
         return np.asarray(targets[self.targets > 0])
@@ -111,6 +122,12 @@ class MeasuredParts:
                 )
         kept = {name: np.array(content[name], dtype=np.int64) for name in ("rows", "targets", "orientations")}
         return cls(**kept, worth=np.array(content["worth"], dtype=np.float64))
+
+
+def _first_of_most(worth: Floats, groups: Sequence[str]) -> int:
+    """Number of the set-up that is worth most, of those that are worth the same the first by name."""
+    alike = np.flatnonzero(worth >= (1.0 - SAME_WORTH) * worth.max()).tolist()
+    return int(min(alike, key=lambda number: groups[number]))
 
 
 def sureness(own_m: Floats, left_m: float, weight: Floats) -> Floats:

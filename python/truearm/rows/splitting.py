@@ -369,9 +369,6 @@ def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
 
 
 def _check_groups(data: Measurements, split: Split, rule: SplitRule) -> None:
-    less = "a larger --train-size"
-    if rule.train_size is None:
-        less = "a smaller --holdout" if rule.holdout_range is None else "a smaller share of --holdout-range"
     trained = set(data.group[split.train].tolist())
     missing = [group for group in data.groups if group not in trained]
     if missing:
@@ -380,8 +377,19 @@ def _check_groups(data: Measurements, split: Split, rule: SplitRule) -> None:
             f"no row of the set-up {list_names(missing[:NAMED])}{more} trains",
             where=", ".join(data.files),
             rule="The frame and tool of every set-up are found from its training rows",
-            way_out=f"Give {less} or another --seed; to judge a whole set-up, use: truearm evaluate",
+            way_out=f"{_way_to_train(data, missing, rule)}; to judge a whole set-up, use: truearm evaluate",
         )
+
+
+def _way_to_train(data: Measurements, groups: list[str], rule: SplitRule) -> str:
+    """How rows of set-ups come to train of which none does."""
+    if _planned(data, np.flatnonzero(np.isin(data.group, groups)), rule).all():
+        marked = f'All of them are marked "{VALIDATE}" in the column "purpose": mark some "train"'
+        return f"{marked}, or state a --holdout other than {HOLDOUT:g}"
+    if rule.train_size is not None:
+        return "Give a larger --train-size or another --seed"
+    less = "--holdout" if rule.holdout_range is None else "share of --holdout-range"
+    return f"Give a smaller {less} or another --seed"
 
 
 def _check_share(share: float, what: str) -> None:
