@@ -1,8 +1,8 @@
 """What stands otherwise from some row on: a target on its tool, a joint, the device or the arm's base.
 
-A target that slips moves along the axes of the flange, a joint turns about its own: neither is the same way in
-the world at all poses, so that no displacement of the set-up follows it. What is left of the rows is asked, for
-each place in the order of measuring, whether it is explained by such a step from there on.
+A target that slips moves along the axes of the flange, a joint turns about its own: neither is the same way
+in the world at all poses, so that no displacement of the set-up follows it. What is left of the rows is asked,
+for each place in the order of measuring, whether it is explained by such a step from there on.
 """
 
 from collections.abc import Sequence
@@ -15,6 +15,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
+TARGET: Final = "target"
+JOINT: Final = "joint"
+FRAME: Final = "frame"
+TARGET_SLIPPED: Final = "target_slipped"
+JOINT_MOVED: Final = "joint_moved"
+SETUP_TURNED: Final = "setup_turned"
+AT_ONCE: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED)
+"""Kinds of notices of what stands otherwise from some row on."""
 AXES: Final = 3
 BESIDE: Final = 5
 """Visits before and behind a step, at the least: fewer are outliers."""
@@ -48,7 +56,7 @@ class Shape:
     """What may stand otherwise.
 
     Attributes:
-        what: "target", "joint" or "frame".
+        what: TARGET, JOINT or FRAME.
         numbers: Which targets or joints, from 0.
         columns: Its columns among those that are asked.
     """
@@ -64,9 +72,10 @@ class Step:
 
     Attributes:
         shape: What stands otherwise.
-        place: Number of the first visit behind it, from 0.
+        place: Number of the first visit behind it, from 0: there it is the whole set-up that differs.
         sizes: By how much (k,), in units of its columns.
         share: Part of the squares that it explains.
+        gain: Logarithm of its evidence over that of none.
         chance: How likely chance explains as much somewhere, with something.
     """
 
@@ -74,11 +83,12 @@ class Step:
     place: int
     sizes: Floats
     share: float
+    gain: float
     chance: float
 
 
 def likeliest_step(
-    left: Left, columns: Floats, shapes: Sequence[Shape], beside: Sequence[int] = ()
+    left: Left, columns: Floats, shapes: Sequence[Shape], beside: Sequence[int] = (), *, others: bool = False
 ) -> Step | None:
     """The step that explains most for how much it may choose; None where there is no room for one.
 
@@ -91,16 +101,17 @@ def likeliest_step(
         columns: Derivatives (n, p) of the values by what may stand otherwise.
         shapes: What may.
         beside: Columns of what may have moved as well.
+        others: Whether there are other set-ups, which the whole of this one may differ from.
     """
     from scipy.special import betaincc  # noqa: PLC0415 - slow to import
 
     gram, pull, unit = _behind(left, columns)
-    places = np.arange(BESIDE, len(gram) - BESIDE + 1)
+    places = np.concatenate([[0] * others, np.arange(BESIDE, len(gram) - BESIDE + 1)]).astype(np.int64)
     if not len(places):
         return None
     gram, pull, unit = gram[places], pull[places], unit[places]
     told, pull, gram, rank_beside = _without(gram, pull, list(beside))
-    best, found = -np.inf, None
+    found: Step | None = None
     for shape in shapes:
         own = list(shape.columns)
         sizes, squares, ranks = _solved(gram[:, own][:, :, own], pull[:, own])
@@ -111,11 +122,11 @@ def likeliest_step(
         gain = -0.5 * (free * np.log(np.maximum(1.0 - share, nothing)) + ranks * np.log(left.freedom))
         gain = np.where(usable, gain, -np.inf)
         k = int(np.argmax(gain))
-        if gain[k] <= best:
+        if not np.isfinite(gain[k]) or (found is not None and gain[k] <= found.gain):
             continue
         chance = float(betaincc(0.5 * ranks[k], 0.5 * free[k], share[k])) * len(places) * len(shapes)
         by = sizes[k] / unit[k, own]
-        best, found = gain[k], Step(shape, int(places[k]), by, float(share[k]), min(chance, 1.0))
+        found = Step(shape, int(places[k]), by, float(share[k]), float(gain[k]), min(chance, 1.0))
     return found
 
 
@@ -136,7 +147,8 @@ def _behind(left: Left, columns: Floats) -> tuple[Floats, Floats, Floats]:
         gram[k], pull[k] = known, left.pull[own] @ here
         square[k] = (here * (left.alone[own, own] @ here)).sum(axis=0)
     pull, square = (np.cumsum(each[::-1], axis=0)[::-1] for each in (pull, square))
-    unit = np.sqrt(np.minimum(square, square[0] - square))
+    unit = np.sqrt(np.minimum(square, np.maximum(square[0] - square, 0.0)))
+    unit[0] = np.sqrt(square[0])
     unit[unit == 0.0] = 1.0
     return gram / (unit[:, :, None] * unit[:, None]), pull / unit, unit
 
@@ -157,7 +169,7 @@ def _without(gram: Floats, pull: Floats, beside: list[int]) -> tuple[Floats, Flo
 
 
 def _solved(gram: Floats, pull: Floats) -> tuple[Floats, Floats, Floats]:
-    """Coefficients (k, c), the squares that they explain (k,), and how many directions tell something (k,)."""
+    """Coefficients (k, c), the squares that they explain (k,), and how many directions tell more (k,)."""
     inverse, rank = _inverse(gram)
     sizes = np.einsum("kab,kb->ka", inverse, pull)
     return sizes, np.einsum("ka,ka->k", sizes, pull), rank

@@ -6,11 +6,23 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
-from truearm.doubts.at_once import AXES, BESIDE, Left, Shape, Step, likeliest_step
+from truearm.doubts.at_once import (
+    AXES,
+    BESIDE,
+    FRAME,
+    JOINT,
+    JOINT_MOVED,
+    SETUP_TURNED,
+    TARGET,
+    TARGET_SLIPPED,
+    Left,
+    Shape,
+    Step,
+    likeliest_step,
+)
 from truearm.doubts.row_order import FOLLOWED, poses_change, poses_of, share_explained
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
@@ -25,12 +37,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-TARGET, JOINT, FRAME = "target", "joint", "frame"
-TARGET_SLIPPED: Final = "target_slipped"
-JOINT_TURNED: Final = "joint_turned"
-SETUP_TURNED: Final = "setup_turned"
-SLIPPED: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_TURNED, FRAME: SETUP_TURNED}
-"""Kinds of notices."""
+KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED}
 MOSTLY: Final = 0.5
 """Part of the squares that a step explains where a calibration does not help, or rows are outliers, for it to
 be the reason."""
@@ -38,6 +45,10 @@ DIGITS: Final = 2
 OWN_GROUP: Final = (
     "Give the rows behind a name of their own in a column `group`: each part then has a frame and a target of "
     "its own."
+)
+ONE_PART: Final = (
+    "Rows of one arm are needed: calibrate from those behind alone, or, where these are few, from the others, "
+    "and bring that up to date with them (truearm update)."
 )
 
 
@@ -96,6 +107,7 @@ class Session:
         rows: Place of the first row of each visit among them (v,).
         left: What is left of their values.
         by: Derivatives of these.
+        others: Whether there are other set-ups.
     """
 
     robot: Robot
@@ -103,13 +115,15 @@ class Session:
     rows: Rows
     left: Left
     by: Derivatives
+    others: bool = False
 
     def step(self) -> Step | None:
         """What stands otherwise from some visit on; None where poses tell the order, or change there too."""
         poses = poses_of(self.robot, self.data.readings[self.rows])
         if share_explained(poses, np.arange(float(len(poses)))) > FOLLOWED:
             return None
-        found = likeliest_step(self.left, self.by.columns, list(self.by.shapes()), range(AXES))
+        shapes, columns = list(self.by.shapes()), self.by.columns
+        found = likeliest_step(self.left, columns, shapes, range(AXES), others=self.others)
         if found is None or poses_change(poses, np.arange(len(poses)), (found.place - 1, found.place)):
             return None
         return found
@@ -162,13 +176,16 @@ def _slips(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Slip]
 
 
 def slips_of(sessions: Sequence[Session]) -> list[Slip]:
-    """The step of each session that has one, in words."""
-    told = []
-    for session in sessions:
-        step = session.step()
-        if step is not None and (chance := step.chance * len(sessions)) < OVERWHELMING:
-            notice = Notice(SLIPPED[step.shape.what], _words(session, step))
-            told.append(Slip(notice, chance, step.share))
+    """The step of each session that has one, in words, the most evident first.
+
+    Joints are those of one arm: what one set-up shows of them, others show as well.
+    """
+    found = [(step, session) for session in sessions if (step := session.step()) is not None]
+    told = list[Slip]()
+    for step, session in sorted(found, key=lambda pair: -pair[0].gain):
+        chance, kind = step.chance * len(sessions), KINDS[step.shape.what]
+        if chance < OVERWHELMING and not (told and kind == JOINT_MOVED):
+            told.append(Slip(Notice(kind, _words(session, step)), chance, step.share))
     return told
 
 
@@ -183,7 +200,9 @@ def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterato
         if len(own) < 2 * BESIDE:
             continue
         root, count = seen.root[own], len(own) * width
-        alone = block_diag(*(root.transpose(0, 2, 1) @ root))
+        alone = np.zeros((len(own), width, len(own), width))
+        alone[np.arange(len(own)), :, np.arange(len(own))] = root.transpose(0, 2, 1) @ root
+        alone = alone.reshape(count, count)
         known = np.einsum("iba,ibjc,jcd->iajd", root, taken[own][:, :, own], root, optimize=True)
         visit = np.repeat(np.arange(len(own)), width)
         left = Left(
@@ -197,51 +216,56 @@ def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterato
         setup, joints = (each[own].reshape(count, -1) for each in (seen.setup, seen.joints))
         points = np.ones(count, dtype=np.bool_)
         by = Derivatives(setup, joints, points, frame, len(found.selection.targets))
-        yield Session(found.robot, fitted.data, seen.rows[own], left, by)
+        yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
 
 
 def _words(session: Session, step: Step) -> str:
     """What stands otherwise, from where on, by how much, and what to do."""
-    before, behind = session.row(step.place - 1), session.row(step.place)
-    where = f"Between {before} and {behind}"
+    where = f"Between {session.row(step.place - 1)} and {session.row(step.place)}"
+    if step.place == 0:
+        where = f"In {session.data.group[session.rows[0]]}, against the other set-ups,"
     if step.shape.what == TARGET:
-        return _of_target(session, step, where)
+        return f"{where} {_of_target(session.by, step)}. {OWN_GROUP}"
     far = length_mm(session.by.way_mm(step), DIGITS)
     if step.shape.what == FRAME:
         turn = float(MRAD_PER_RAD * np.linalg.norm(step.sizes))
         return (
-            f"{where} the measuring device, or the arm's base, turned at once, by {turn:.{DIGITS}g} mrad "
-            f"(points by {far} on average). {OWN_GROUP}"
+            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by {far} "
+            f"on average). {OWN_GROUP}"
         )
-    return _of_joint(session, step, where, far)
+    what, way_out = _of_joints(session, step)
+    return f"{where} {what}: points by {far} on average. {way_out}"
 
 
-def _of_target(session: Session, step: Step, where: str) -> str:
-    """Words on targets that slipped."""
-    count, numbers = session.by.targets, step.shape.numbers
+def _of_target(by: Derivatives, step: Step) -> str:
+    """Which targets slipped, and how far."""
+    numbers = step.shape.numbers
     by_mm = MM_PER_METRE * step.sizes[: AXES * len(numbers)].reshape(-1, AXES)
-    if len(numbers) == 1:
-        axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
-        how = f"by {length_mm(float(np.linalg.norm(by_mm)), DIGITS)} (along the axes of the flange {axes} mm)"
-    else:
-        how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
-    what = f"target {numbers[0] + 1}" if len(numbers) < count else "the target" if count == 1 else "the targets"
-    verb = "were" if len(numbers) > 1 else "was"
+    how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
+    if len(numbers) > 1:
+        return f"the targets slipped on the tool, or were put elsewhere on it, {how}"
+    axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
+    what = "the target" if by.targets == 1 else f"target {numbers[0] + 1}"
     return (
-        f"{where} {what} slipped on the tool, or {verb} put elsewhere on it, {how}. {OWN_GROUP}"
+        f"{what} slipped on the tool, or was put elsewhere on it, {how} (along the flange's axes {axes} mm)"
     )
 
 
-def _of_joint(session: Session, step: Step, where: str, far: str) -> str:
-    """Words on joints that turned."""
-    sizes = []
-    for joint, by in zip(step.shape.numbers, step.sizes, strict=True):
-        if session.robot.joints[joint] == "prismatic":
-            sizes.append(f"joint {joint + 1} moved by {MM_PER_METRE * by:+.3f} mm")
-        else:
-            sizes.append(f"joint {joint + 1} turned by {np.degrees(by):+.4f} deg")
-    return (
-        f"{where} {' and '.join(sizes)} against its reading, as one that slipped or was mastered anew, "
-        f"and the target by {far} on average. The rows before are of another arm than those behind: calibrate "
-        "from one part alone."
-    )
+def _of_joints(session: Session, step: Step) -> tuple[str, str]:
+    """Which joints moved, and what to do: what frame or target of a set-up take over needs no more."""
+    numbers, by, joints = step.shape.numbers, session.by, session.robot.joints
+    sizes = [_moved_by(joints[joint], size) for joint, size in zip(numbers, step.sizes, strict=True)]
+    moved = f"joint {numbers[0] + 1} moved by {sizes[0]} against its reading"
+    if len(numbers) > 1:
+        each = ", ".join(f"{joint + 1} by {size}" for joint, size in zip(numbers, sizes, strict=True))
+        moved = f"joints moved against their readings ({each})"
+    if numbers == (0,) and by.frame:
+        return f"{moved}, or the measuring device about the same axis", OWN_GROUP
+    if numbers == (len(joints) - 1,) and by.targets == 1:
+        return f"{moved}, or the tool about the same axis", OWN_GROUP
+    return f"{moved}, as where one slips or is mastered anew", ONE_PART
+
+
+def _moved_by(joint: str, size: float) -> str:
+    """How far a joint moved, in words."""
+    return f"{MM_PER_METRE * size:+.3f} mm" if joint == "prismatic" else f"{np.degrees(size):+.4f} deg"

@@ -172,10 +172,14 @@ class Whitened:
         What a fit takes up has left little, which stands for much: directions that it takes all but FAINT of
         count that.
         """
-        from scipy.linalg import solve  # noqa: PLC0415 - slow to import
-
-        own = np.eye(self.left.size) - (1.0 - FAINT) * self.taken
-        return float(self.left.ravel() @ solve(own, self.left.ravel(), assume_a="pos"))
+        left = self.left.ravel()
+        try:
+            factor = np.linalg.cholesky(np.eye(len(left)) - (1.0 - FAINT) * self.taken)
+            return float(np.square(np.linalg.solve(factor, left)).sum())
+        except np.linalg.LinAlgError:
+            # Of rows that it gives little weight a fit may seem to take more than all.
+            taken, directions = np.linalg.eigh(self.taken)
+            return float((np.square(directions.T @ left) / np.maximum(1.0 - taken, FAINT)).sum())
 
     def explained(self, columns: Floats) -> tuple[float, Floats]:
         """How well so many columns (v, m, k) explain what is left, in metres per unit of each.

@@ -73,6 +73,8 @@ def verdict(facts: Facts) -> str:
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
+    if facts.changed_meanwhile:
+        return f"{said} What was measured changed meanwhile: put that right first."
     if facts.update is not None and facts.update["verdict"] == "field":
         return f"{said} The calibration no longer fits the arm: measure again and calibrate."
     return said
@@ -102,7 +104,8 @@ def tone(facts: Facts) -> Tone:
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"
-    return "good" if after < GOOD * before and not facts.mostly_refused else "fair"
+    doubted = facts.mostly_refused or facts.changed_meanwhile
+    return "good" if after < GOOD * before and not doubted else "fair"
 
 
 def cards(facts: Facts) -> list[Card]:
