@@ -200,17 +200,32 @@ def evaluate(
     of_no_use = spoiled or _of_no_use(calibration, held, changed) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
         of_no_use = _moved(calibration, given, chosen, held.median_mm(best)) or of_no_use
-    if changed and not spoiled and can_be_updated(calibration):
-        with stages("looking for what slipped"):
-            slipped = changed_meanwhile(calibration, given, chosen.use)
-        # What slipped is no change of the arm; beside one, it is told as well.
-        most = any(slip.share > MOSTLY for slip in slipped)
-        of_no_use = [*([] if most else of_no_use), *(slip.notice for slip in slipped)]
-    notices = [*notices, *of_no_use, *doubts]
+    told = (
+        of_no_use if spoiled or not changed else _with_slips(calibration, given, (chosen, stages), of_no_use)
+    )
+    notices = [*notices, *told, *doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
     counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
     return Evaluation(*counts, statistics, tuple(notices), held, _finds(task, chosen))
+
+
+def _with_slips(
+    calibration: Calibration,
+    data: Measurements,
+    how: tuple[EvaluationOptions, Stages],
+    told: list[Notice],
+) -> list[Notice]:
+    """What slipped while rows were measured: where that is most of what they miss, in place of what was told
+    of the arm.
+    """
+    if not can_be_updated(calibration):
+        return told
+    options, stages = how
+    with stages("looking for what slipped"):
+        slipped = changed_meanwhile(calibration, data, options.use)
+    most = any(slip.share > MOSTLY for slip in slipped)
+    return [*([] if most else told), *(slip.notice for slip in slipped)]
 
 
 def _finds(task: Task, options: EvaluationOptions) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ OPTIONS: Final = {
 
 
 MEANWHILE: Final = (
-    "Something was otherwise from some row on, as the warning says: put that right and update the calibration "
-    "before once more, which may still hold."
+    "Something was otherwise from some row on, as the warning says: put that right and update the "
+    "calibration before once more, which may still hold."
 )
 """What to do with an update from rows that something slipped between."""
 FIVE_OF_SIX: Final = (

@@ -1,8 +1,8 @@
 """What stands otherwise from some row on: a target on its tool, a joint, the device or the arm's base.
 
 A target that slips moves along the axes of the flange, a joint turns about its own: neither is the same way
-in the world at all poses, so that no displacement of the set-up follows it. What is left of the rows is asked,
-for each place in the order of measuring, whether it is explained by such a step from there on.
+in the world at all poses, so that no displacement of the set-up follows it. What is left of the rows is
+asked, for each place in the order of measuring, whether it is explained by such a step from there on.
 """
 
 from collections.abc import Sequence

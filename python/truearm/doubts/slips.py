@@ -43,12 +43,12 @@ MOSTLY: Final = 0.5
 be the reason."""
 DIGITS: Final = 2
 OWN_GROUP: Final = (
-    "Give the rows behind a name of their own in a column `group`: each part then has a frame and a target of "
-    "its own."
+    "Give the rows behind a name of their own in a column `group`: each part then has a frame and a target "
+    "of its own."
 )
 ONE_PART: Final = (
-    "Rows of one arm are needed: calibrate from those behind alone, or, where these are few, from the others, "
-    "and bring that up to date with them (truearm update)."
+    "Rows of one arm are needed: calibrate from those behind alone, or, where these are few, from the "
+    "others, and bring that up to date with them (truearm update)."
 )
 
 
@@ -230,8 +230,8 @@ def _words(session: Session, step: Step) -> str:
     if step.shape.what == FRAME:
         turn = float(MRAD_PER_RAD * np.linalg.norm(step.sizes))
         return (
-            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by {far} "
-            f"on average). {OWN_GROUP}"
+            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by "
+            f"{far} on average). {OWN_GROUP}"
         )
     what, way_out = _of_joints(session, step)
     return f"{where} {what}: points by {far} on average. {way_out}"

@@ -73,11 +73,16 @@ def verdict(facts: Facts) -> str:
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
+    return f"{said}{_changed(facts)}"
+
+
+def _changed(facts: Facts) -> str:
+    """What of the measurements or of the arm is not as it was, with a blank before it."""
     if facts.changed_meanwhile:
-        return f"{said} What was measured changed meanwhile: put that right first."
+        return " What was measured changed meanwhile: put that right first."
     if facts.update is not None and facts.update["verdict"] == "field":
-        return f"{said} The calibration no longer fits the arm: measure again and calibrate."
-    return said
+        return " The calibration no longer fits the arm: measure again and calibrate."
+    return ""
 
 
 def _without_outliers(facts: Facts) -> str:
