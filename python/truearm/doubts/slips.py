@@ -124,7 +124,7 @@ class Session:
             return None
         shapes, columns = list(self.by.shapes()), self.by.columns
         found = likeliest_step(self.left, columns, shapes, range(AXES), others=self.others)
-        if found is None or poses_change(poses, np.arange(len(poses)), (found.place - 1, found.place)):
+        if found is None or poses_change(poses, np.arange(float(len(poses))), (found.place - 1, found.place)):
             return None
         return found
 
@@ -200,9 +200,9 @@ def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterato
         if len(own) < 2 * BESIDE:
             continue
         root, count = seen.root[own], len(own) * width
-        alone = np.zeros((len(own), width, len(own), width))
-        alone[np.arange(len(own)), :, np.arange(len(own))] = root.transpose(0, 2, 1) @ root
-        alone = alone.reshape(count, count)
+        blocks = np.zeros((len(own), width, len(own), width))
+        blocks[np.arange(len(own)), :, np.arange(len(own))] = root.transpose(0, 2, 1) @ root
+        alone = blocks.reshape(count, count)
         known = np.einsum("iba,ibjc,jcd->iajd", root, taken[own][:, :, own], root, optimize=True)
         visit = np.repeat(np.arange(len(own)), width)
         left = Left(
