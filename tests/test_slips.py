@@ -118,16 +118,13 @@ def test_a_device_that_turns_is_told(arm, steady):
 
 
 def test_evaluations_and_updates_do_not_blame_the_calibration(arm, known):
-    data = with_slip(arm, arm.measure(arm.poses(ROWS, seed=7)))
+    data = with_slip(arm, arm.measure(arm.poses(HALF, seed=7)), HALF // 2)
     judged, found = ta.evaluate(known[0], data), ta.update(known[0], data)
     assert list(told(judged.notices)) == [TARGET_SLIPPED]
     assert "not_as_calibrated" not in {notice.kind for notice in judged.notices}
     assert found.verdict == "field"
     assert found.changed_meanwhile
     assert "calibrate_anew" not in {advice.kind for advice in advise(Facts(found.calibration), None)}
-    apart = ta.update(known[0], with_groups(data))
-    assert apart.verdict != "field"
-    assert not told(apart.notices)
 
 
 def noise_alone(rng, visits):
@@ -143,7 +140,7 @@ def noise_alone(rng, visits):
 def test_what_noise_shows_somewhere_is_told_as_likely():
     rng, shapes = np.random.default_rng(0), [Shape(JOINT, (k,), (k,)) for k in range(4)]
     found = [likeliest_step(noise_alone(rng, 40), rng.normal(size=(120, 4)), shapes) for _ in range(60)]
-    assert np.mean([step.chance < 0.1 for step in found]) < 0.2
+    assert np.mean([step is not None and step.chance < 0.1 for step in found]) < 0.2
 
 
 def test_a_step_is_found_at_its_place_beside_another_with_its_size():
@@ -154,6 +151,7 @@ def test_a_step_is_found_at_its_place_beside_another_with_its_size():
     square = float(pull @ np.linalg.pinv(left.metric) @ pull)
     shapes = [Shape(JOINT, (k,), (k,)) for k in range(1, 4)]
     found = likeliest_step(replace(left, pull=pull, square=square), columns, shapes, [0])
+    assert found is not None
     assert (found.shape.numbers, found.place) == ((1,), 17)
     assert found.sizes == pytest.approx([3.0], abs=0.5)
     assert found.chance < 1e-20
