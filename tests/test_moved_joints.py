@@ -92,7 +92,7 @@ def test_what_chance_explains_is_as_likely_as_it_is():
         left = (noise - taken @ noise).reshape(visits, width)
         root, shots = np.broadcast_to(np.eye(width), (visits, width, width)), np.ones_like(left)
         nothing = np.zeros((visits, width, 6))
-        seen = Whitened(np.arange(visits), left, shots, root, taken, nothing, np.ones_like(left))
+        seen = Whitened(np.arange(visits), left, shots, root, taken, nothing, np.ones_like(left), nothing)
         found.append(seen.explained(rng.normal(size=(visits, width, 6)))[0])
     assert np.quantile(found, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.08)
 
@@ -103,7 +103,7 @@ def test_what_columns_do_is_found_with_its_size():
     noise = 0.1 * rng.normal(size=(50, 3))
     root, ones = np.broadcast_to(np.eye(3), (50, 3, 3)), np.ones((50, 3))
     left = columns @ by + noise
-    seen = Whitened(np.arange(50), left, ones, root, np.zeros((150, 150)), columns, ones)
+    seen = Whitened(np.arange(50), left, ones, root, np.zeros((150, 150)), columns, ones, columns)
     chance, found = seen.explained(columns)
     assert chance < 1e-20
     assert found == pytest.approx(by, abs=0.05)

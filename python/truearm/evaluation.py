@@ -12,7 +12,13 @@ from truearm._core import ANGLE_ARM_M, Setup
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts.admitted import admitted
-from truearm.doubts.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, changed_since, not_as_calibrated
+from truearm.doubts.as_calibrated import (
+    AS_KNOWN,
+    NOT_AS_CALIBRATED,
+    can_be_updated,
+    changed_since,
+    not_as_calibrated,
+)
 from truearm.doubts.gross_rows import (
     FAR_ROWS,
     Expected,
@@ -22,6 +28,7 @@ from truearm.doubts.gross_rows import (
 )
 from truearm.doubts.of_results import NO_HELP, no_help
 from truearm.doubts.outliers import known_mean_mm
+from truearm.doubts.slips import MOSTLY
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
@@ -49,6 +56,7 @@ from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
+from truearm.updating.comparing import changed_meanwhile
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -192,11 +200,32 @@ def evaluate(
     of_no_use = spoiled or _of_no_use(calibration, held, changed) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
         of_no_use = _moved(calibration, given, chosen, held.median_mm(best)) or of_no_use
-    notices = [*notices, *of_no_use, *doubts]
+    told = (
+        of_no_use if spoiled or not changed else _with_slips(calibration, given, (chosen, stages), of_no_use)
+    )
+    notices = [*notices, *told, *doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
     counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
     return Evaluation(*counts, statistics, tuple(notices), held, _finds(task, chosen))
+
+
+def _with_slips(
+    calibration: Calibration,
+    data: Measurements,
+    how: tuple[EvaluationOptions, Stages],
+    told: list[Notice],
+) -> list[Notice]:
+    """What slipped while rows were measured: where that is most of what they miss, in place of what was told
+    of the arm.
+    """
+    if not can_be_updated(calibration):
+        return told
+    options, stages = how
+    with stages("looking for what slipped"):
+        slipped = changed_meanwhile(calibration, data, options.use)
+    most = any(slip.share > MOSTLY for slip in slipped)
+    return [*([] if most else told), *(slip.notice for slip in slipped)]
 
 
 def _finds(task: Task, options: EvaluationOptions) -> tuple[str, ...]:

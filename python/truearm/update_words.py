@@ -11,6 +11,11 @@ OPTIONS: Final = {
 """Of what a joint may be confounded with: the option that keeps it, and when that is right."""
 
 
+MEANWHILE: Final = (
+    "Something was otherwise from some row on, as the warning says: put that right and update the "
+    "calibration before once more, which may still hold."
+)
+"""What to do with an update from rows that something slipped between."""
 FIVE_OF_SIX: Final = (
     "As a row of the table the base has five of the six freedoms of a frame: constants do not correct a "
     "shift along the sixth, the y axis of most bases."

@@ -99,10 +99,13 @@ def _found_words(found: "Evaluation") -> str:
 def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update: str) -> list[str]:
     """What to do with a calibration that was judged: `update` it where the arm is not as it was."""
     from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
+    from truearm.doubts.at_once import AT_ONCE
     from truearm.doubts.gross_rows import FAR_ROWS
     from truearm.doubts.of_results import OF_NO_USE
 
     kinds = {notice.kind for notice in found.notices}
+    if kinds & set(AT_ONCE):
+        return []
     if NOT_AS_CALIBRATED in kinds:
         return [update] if can_be_updated(known) else []
     return [] if kinds & {*OF_NO_USE, FAR_ROWS} else compensate_commands(known, file)

@@ -164,6 +164,8 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
         place: The file that was written, if any.
         given: The measurements, and the options that the command was given, as they were typed.
     """
+    if found.verdict == "field" and found.changed_meanwhile:
+        return
     if found.verdict == "field":
         anew = calibrate_anew(known)
         say_wrapped(" ".join((FROM_NEW_ROWS, *anew.notes)))
@@ -182,7 +184,7 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.update_words import of_known_world, untested_joints, way_out_of_keeping
+    from truearm.update_words import MEANWHILE, of_known_world, untested_joints, way_out_of_keeping
 
     untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
@@ -192,6 +194,8 @@ def _verdict(found: "Update") -> str:
             f"{listed(found.tested, 'or').capitalize()} changed. All else still fits, so the updated "
             f"calibration replaces the old one. {untested}"
         ).strip()
+    if found.changed_meanwhile:
+        return f"{listed(found.estimated).capitalize()} do not explain what was measured. {MEANWHILE}"
     kept, base = way_out_of_keeping(found.kept), of_known_world(found.to_dict())
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
 from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, poses_of, share_explained
+from truearm.doubts.slips import Slip
 from truearm.doubts.whitened import AXES, Whitened
 from truearm.errors import Notice, count_of
 from truearm.fits.fitted_rows import FittedRows
@@ -83,14 +84,18 @@ class Moved:
         return f"{self.column.name} (by {far} from its lowest value to its highest{empty})"
 
 
-def moved_joints(found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats) -> list[Notice]:
-    """A warning where joints move with a column that is not used, or with the order of the rows.
+def moved_joints(
+    found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats, slips: Sequence[Slip]
+) -> list[Notice]:
+    """A warning where joints move with a column that is not used, or with the order of the rows; where a step
+    explains more, what stands otherwise from some row on.
 
     Args:
         found: A calibration of what varies: constants leave too much that poses explain.
         rows: The rows that it was fitted to.
         seen: What it leaves of them.
         progress: When each of them was measured, from 0 for the first of its set-up to 1 for the last (n,).
+        slips: Steps that explain what is left.
     """
     if found.variable is None or len(seen.rows) < FEWEST_VISITS:
         return []
@@ -99,6 +104,8 @@ def moved_joints(found: Calibration, rows: FittedRows, seen: Whitened, progress:
         moved for column in asked if (moved := _moved(found, seen, column)).chance * len(asked) < OVERWHELMING
     ]
     told.sort(key=lambda moved: moved.chance)
+    if slips and (not told or min(slip.chance for slip in slips) <= told[0].chance * len(asked)):
+        return [slip.notice for slip in slips]
     if columns := [moved for moved in told if not moved.column.as_time]:
         return [_with_columns(columns)]
     return [_while_measured(told)] if told else []

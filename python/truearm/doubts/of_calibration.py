@@ -28,6 +28,7 @@ from truearm.doubts.of_results import (
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, Outliers
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
+from truearm.doubts.slips import main_slips, slips
 from truearm.doubts.turned_later import turned_later
 from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
@@ -50,7 +51,9 @@ from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
 Floats = NDArray[np.float64]
 
 OPEN_SETUP: Final = "open_setup"
-WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *EXCHANGED, *WOULD_FIT}
+REASONS: Final = {*EXCHANGED, *WOULD_FIT}
+"""Notices of what is wrong with rows."""
+WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *REASONS}
 """Notices of what spoils a fit, so that what it leaves of rows tells nothing else."""
 
 
@@ -94,8 +97,9 @@ def of_result(
     """
     data, progress = given
     told, robust = _doubted(task, found, data, stages)
-    if {notice.kind for notice in told} & WRONG_ROWS:
-        return told
+    kinds = {notice.kind for notice in told}
+    if kinds & WRONG_ROWS:
+        return told if kinds & REASONS else [*told, *_reason(found, progress)]
     return [*told, *_of_left(task, found, progress, robust)]
 
 
@@ -109,7 +113,15 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
     if may_be_bent(found) and rows.outliers():
         found, rows = _unbent(task, found, rows, robust or unbent(task, rows))
     seen = Whitened.of(found, rows, progress)
-    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress)]
+    slipped = slips(found, rows, seen, progress)
+    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
+
+
+def _reason(found: Calibration, progress: Floats) -> list[Notice]:
+    """What stands otherwise from some row on, where that explains most of what a calibration leaves."""
+    if found.rows is None or found.scheme is not None or found.selection.distances:
+        return []
+    return [slip.notice for slip in main_slips(found, found.rows, progress)]
 
 
 def _unbent(task: Task, found: Calibration, rows: FittedRows, fits: Fits) -> tuple[Calibration, FittedRows]:

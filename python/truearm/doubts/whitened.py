@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -106,6 +107,7 @@ class Whitened:
         taken: T (v m, v m).
         joints: Derivatives (v, m, N) by the joint values, base frame; zero where not measured.
         single: Variance (v, m) of a single shot, m^2.
+        setup: Derivatives (v, m, W) by the unknowns of the own set-up, base frame; zero where not measured.
     """
 
     rows: Rows
@@ -115,22 +117,27 @@ class Whitened:
     taken: Floats
     joints: Floats
     single: Floats
+    setup: Floats
 
     @classmethod
-    def of(cls, found: Calibration, fitted: FittedRows, progress: Floats) -> "Whitened":
+    def of(
+        cls, found: Calibration, fitted: FittedRows, progress: Floats, *, outliers: bool = False
+    ) -> "Whitened":
         """Those of a calibration from positions, of rows that it was fitted to.
 
         Args:
             found: The calibration, of constants or of what varies.
             fitted: Its rows, n of them.
             progress: When each was measured, from 0 for the first of its set-up to 1 for the last (n,).
+            outliers: Whether outliers of what varies are among them.
         """
         # What varies is without its outliers; constants keep them, and are looked at by medians.
-        trusted = (fitted.weight >= TRUSTED) | (found.variable is None)
+        trusted = (fitted.weight >= TRUSTED) | (found.variable is None) | outliers
         seen = Visits.of(fitted, found.selection, progress, trusted)
         rows, held = seen.rows, seen.held
         data = fitted.fitted.select(rows)
         inputs, arm, setup, joints = _derivatives(found, data, held)
+        own = setup.reshape(*held.shape, len(found.groups), -1).sum(axis=2)
         size = held.shape[1]
         noise, single = seen.noise(found.spread.noise(arm, np.zeros(size, dtype=np.bool_)))
         root = np.linalg.cholesky(np.linalg.inv(noise)).transpose(0, 2, 1)
@@ -141,7 +148,7 @@ class Whitened:
         known = np.einsum("iab,ibkc->iakc", counted, known)
         taken = np.einsum("iakc,kdc->iakd", known, counted).reshape(held.size, held.size)
         left = np.einsum("iab,ib->ia", root, seen.residual)
-        return cls(rows, left, seen.shots, root, taken, joints, single)
+        return cls(rows, left, seen.shots, root, taken, joints, single, own)
 
     @property
     def held(self) -> Mask:
@@ -157,6 +164,22 @@ class Whitened:
     def freedom(self) -> float:
         """Degrees of freedom of the residuals."""
         return float(self.kept[self.held].sum())
+
+    @cached_property
+    def square(self) -> float:
+        """Sum of squares of the residuals in units of their own covariance.
+
+        What a fit takes up has left little, which stands for much: directions that it takes all but FAINT of
+        count that.
+        """
+        left = self.left.ravel()
+        try:
+            factor = np.linalg.cholesky(np.eye(len(left)) - (1.0 - FAINT) * self.taken)
+            return float(np.square(np.linalg.solve(factor, left)).sum())
+        except np.linalg.LinAlgError:
+            # Of rows that it gives little weight a fit may seem to take more than all.
+            taken, directions = np.linalg.eigh(self.taken)
+            return float((np.square(directions.T @ left) / np.maximum(1.0 - taken, FAINT)).sum())
 
     def explained(self, columns: Floats) -> tuple[float, Floats]:
         """How well so many columns (v, m, k) explain what is left, in metres per unit of each.
@@ -175,7 +198,7 @@ class Whitened:
         known, directions = np.linalg.eigh(whitened.T @ whitened - whitened.T @ self.taken @ whitened)
         directions, known = directions[:, known > FAINT], known[known > FAINT]
         score = directions.T @ (whitened.T @ self.left.ravel())
-        share = float((np.square(score) / known).sum() / np.square(self.left).sum())
+        share = float((np.square(score) / known).sum() / self.square)
         found = directions @ (score / known) / np.where(size > 0.0, size, 1.0)
         rank, free = len(known), self.freedom - len(known)
         if rank == 0 or free <= rank:

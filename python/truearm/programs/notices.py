@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from truearm.calibration import Calibration
+from truearm.doubts.at_once import AT_ONCE
 from truearm.errors import Notice, list_names, typed
 from truearm.fits.stillness import carried_joints, moved_joints, still_words
 from truearm.inputs import PAYLOAD_KG, is_payload
@@ -16,6 +17,7 @@ from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
+from truearm.update_words import MEANWHILE
 
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4
@@ -104,6 +106,9 @@ def update_notices(calibration: Calibration) -> list[Notice]:
     revision = calibration.revision
     if revision is None or revision.report["verdict"] != "field":
         return []
+    if any(notice.kind in AT_ONCE for notice in calibration.notices):
+        text = f"What the update that this calibration is of was measured with changed meanwhile. {MEANWHILE}"
+        return [Notice("update", text)]
     text = (
         "The update that this calibration is of found that it no longer fits the arm: what it says of its "
         "standard deviation does not hold, and corrections may miss. Measure again and calibrate."

@@ -120,7 +120,7 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
 
 
 def _no_longer_fits(facts: Facts) -> Iterator[Advice]:
-    if facts.update is not None and facts.update["verdict"] == "field":
+    if facts.update is not None and facts.update["verdict"] == "field" and not facts.changed_meanwhile:
         words = (
             f"{listed(facts.update['estimated']).capitalize()} do not explain what the update measured. "
             "Check that these are measurements of this arm. If they are, measure as many poses as it was "
@@ -145,7 +145,7 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if not leaves_noise(facts.best) or any(_stated_sigma(facts)):
+    if not leaves_noise(facts.best) or facts.changed_meanwhile or any(_stated_sigma(facts)):
         return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
@@ -342,6 +342,8 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
 
 def _what_varies(facts: Facts) -> Iterator[Advice]:
     mean, constant = facts.mean_mm(), facts.mean_mm(CONSTANT)
+    if facts.changed_meanwhile:
+        return
     if facts.best == CONSTANT and not facts.calibration.selection.distances:
         words = "Here they are constant; --model variable shows how much they vary over the workspace."
         yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)
@@ -384,7 +386,7 @@ RULES: Final = (
     _intervals,
     _what_varies,
 )
-RULES_OF_UPDATES: Final = (_no_longer_fits, _refused, _left_out, _unseen, _few_held)
+RULES_OF_UPDATES: Final = (_would_fit, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
 RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.description.one_turn import one_turn
+from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.grids import grid_steps, grid_words
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers
@@ -226,6 +227,11 @@ class Facts:
     def noticed(self, kind: str) -> str:
         """The calibration's notice of a kind; empty where there is none."""
         return next((str(notice) for notice in self.calibration.notices if notice.kind == kind), "")
+
+    @property
+    def changed_meanwhile(self) -> bool:
+        """Whether something stood otherwise from some measured row on."""
+        return any(map(self.noticed, AT_ONCE))
 
     @cached_property
     def still(self) -> str:

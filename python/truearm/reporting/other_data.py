@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED
+from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.of_results import OF_NO_USE
 from truearm.evaluation import Evaluation
 from truearm.judgement.validation import HEADINGS, STATISTICS
@@ -16,12 +17,12 @@ from truearm.reporting.parts import Part, Section, Table
 from truearm.solving import FEATURE_RANGE
 from truearm.units import MM_PER_METRE
 
-WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED)
+WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED, *AT_ONCE)
 
 
 def not_met(facts: Facts) -> list[Advice]:
     """What to do first where the calibration is of no use on the other measurements, features are beyond what
-    was learnt, or the arm is not as it was; empty elsewhere.
+    was learnt, the arm is not as it was, or something slipped meanwhile; empty elsewhere.
     """
     notices = () if facts.other is None else facts.other.notices
     why = [notice.message for notice in notices if notice.kind in WORTH_A_LOOK]
@@ -32,10 +33,14 @@ def not_met(facts: Facts) -> list[Advice]:
 
 
 def _no_help(found: Evaluation) -> str:
-    """A sentence, with a blank before it, where the calibration is of no use on the other measurements."""
+    """A sentence, with a blank before it, where the calibration is of no use on the other measurements, or
+    misses them for another reason.
+    """
     kinds = {notice.kind for notice in found.notices}
     if kinds & set(OF_NO_USE):
         return " On these measurements the calibration does not help."
+    if kinds & set(AT_ONCE):
+        return " What was measured changed meanwhile."
     return (
         " The arm, its tool or the set-up is not as it was calibrated." if NOT_AS_CALIBRATED in kinds else ""
     )

@@ -8,7 +8,14 @@ from truearm.judgement.validation import HEADINGS, STATISTICS, Validation
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
-from truearm.update_words import follows_words, motion_name, of_known_world, untested_joints, untested_words
+from truearm.update_words import (
+    MEANWHILE,
+    follows_words,
+    motion_name,
+    of_known_world,
+    untested_joints,
+    untested_words,
+)
 
 VERDICTS: Final = {
     "holds": "No significant change was found.",
@@ -23,7 +30,7 @@ def since_update(facts: Facts) -> Section:
     if told is None:
         return Section(title, [])
     parts: list[Part] = [
-        Text(_overall(told)),
+        Text(_overall(facts, told)),
         _offsets(told, facts.calibration.groups),
         *_motions(told),
         _errors(told),
@@ -31,12 +38,14 @@ def since_update(facts: Facts) -> Section:
     return Section(title, [*parts, *_former(told, facts.best)])
 
 
-def _overall(told: Mapping[str, Any]) -> str:
+def _overall(facts: Facts, told: Mapping[str, Any]) -> str:
     words = VERDICTS[told["verdict"]].format(
         tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
     left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
-    if told["verdict"] == "field" and (base := of_known_world(told)):
+    if told["verdict"] == "field" and facts.changed_meanwhile:
+        words = f"{listed(told['estimated']).capitalize()} do not explain what was measured. {MEANWHILE}"
+    elif told["verdict"] == "field" and (base := of_known_world(told)):
         words = f"{words} {base}"
     if untested := untested_joints(told):
         words = f"{words} {untested}"

@@ -73,9 +73,16 @@ def verdict(facts: Facts) -> str:
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
+    return f"{said}{_changed(facts)}"
+
+
+def _changed(facts: Facts) -> str:
+    """What of the measurements or of the arm is not as it was, with a blank before it."""
+    if facts.changed_meanwhile:
+        return " What was measured changed meanwhile: put that right first."
     if facts.update is not None and facts.update["verdict"] == "field":
-        return f"{said} The calibration no longer fits the arm: measure again and calibrate."
-    return said
+        return " The calibration no longer fits the arm: measure again and calibrate."
+    return ""
 
 
 def _without_outliers(facts: Facts) -> str:
@@ -102,7 +109,8 @@ def tone(facts: Facts) -> Tone:
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"
-    return "good" if after < GOOD * before and not facts.mostly_refused else "fair"
+    doubted = facts.mostly_refused or facts.changed_meanwhile
+    return "good" if after < GOOD * before and not doubted else "fair"
 
 
 def cards(facts: Facts) -> list[Card]:

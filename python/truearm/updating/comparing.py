@@ -9,7 +9,9 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.doubts.admitted import admitted
+from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.of_results import LARGE_MM
+from truearm.doubts.slips import Slip
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import (
     InputError,
@@ -21,7 +23,7 @@ from truearm.errors import (
     in_words,
     list_names,
 )
-from truearm.fits.core_set import select_fitted
+from truearm.fits.core_set import Use, select_fitted
 from truearm.fits.fitted_rows import known_rows, overwhelming
 from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors, mean_distance
@@ -35,6 +37,7 @@ from truearm.update_words import way_out_of_keeping
 from truearm.updating.certainty import expected_mm, less_certain
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.kept_parts import KeptParts
+from truearm.updating.meanwhile import meanwhile
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scale import known_scale, silent_rows
@@ -141,6 +144,11 @@ class Update:
         before, after = self.expected_mm or (None, None)
         return {"expected_before_mm": before, "expected_after_mm": after}
 
+    @property
+    def changed_meanwhile(self) -> bool:
+        """Whether something stood otherwise from some row on: the arm is then not told as changed by it."""
+        return any(notice.kind in AT_ONCE for notice in self.notices)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration."""
         return {
@@ -219,6 +227,29 @@ def update(
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
 
+def changed_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
+    """What stood otherwise from some row on while an arm was measured that is not as it was calibrated.
+
+    Args:
+        calibration: The calibration.
+        data: The new measurements.
+        use: What of them to use.
+
+    Returns:
+        Nothing where an update cannot be made of them.
+    """
+    try:
+        data = one_row_a_visit(data)
+        options = UpdateOptions(use=use)
+        data, _ = some_poses(data, _task(calibration, data, options, no_stages)[0].selection)
+        task, _ = _task(calibration, data, options, no_stages)
+        unknowns = Unknowns.of(calibration, task, options, data)
+        rows, _ = _without_outliers(calibration, _Rows.of(Scene(task, data, calibration, unknowns)))
+        return meanwhile(rows.scene, estimate(rows.scene, rows.scatter, rows.start, unknowns.free))
+    except (InputError, WorkError, UsageError):
+        return []
+
+
 @dataclass(frozen=True, eq=False)
 class _Rows:
     """Measurements, where the search for what moved begins, and how an unchanged arm may scatter there."""
@@ -260,7 +291,8 @@ class _Found:
             judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
         kept = KeptParts(self.calibration, scene, {tool.group for tool in tools if tool.moved})
-        notices = (*notices, *kept.notices)
+        slipped = [slip.notice for slip in meanwhile(scene, found)]
+        notices = (*notices, *kept.notices, *slipped)
         judged = left_out_errors(self.calibration, scene, found)
         told = Update(
             calibration=self.calibration,

@@ -171,13 +171,22 @@ def folds(found: Estimate, std: Floats, free: Mask) -> Iterator[tuple[NDArray[np
         yield left, step
 
 
-def surprise(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
-    """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
+def unexplained(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, Floats]:
+    """Inverse covariance (R, R) of all values without what the free unknowns explain, and the residuals that
+    there are without these (R,).
+    """
     linear, precision = found.linear, found.scatter.precision
     along = (linear.jacobian[:, free] * std[free]) @ _Least.of(linear, found.scatter, std, free).inverse
     pulls = precision @ along
     inverse = precision - pulls @ pulls.T
-    pull = inverse @ (linear.residual + linear.jacobian[:, free] @ linear.departure[free])
+    return inverse, linear.residual + linear.jacobian[:, free] @ linear.departure[free]
+
+
+def surprise(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
+    """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
+    linear = found.linear
+    inverse, residual = unexplained(found, std, free)
+    pull = inverse @ residual
     poses = np.unique(linear.pose)
     squares = np.empty(len(poses))
     for k, pose in enumerate(poses):

@@ -1,0 +1,271 @@
+"""Targets, joints and set-ups that stand otherwise from some row on, told with row, size and way out."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.defaults import NO_DRIFT
+from truearm.doubts.at_once import (
+    AXES,
+    BESIDE,
+    FRAME,
+    JOINT,
+    JOINT_MOVED,
+    SETUP_TURNED,
+    TARGET,
+    TARGET_SLIPPED,
+    Left,
+    Shape,
+    Step,
+    likeliest_step,
+)
+from truearm.doubts.row_order import FOLLOWED, poses_change, poses_of, share_explained
+from truearm.doubts.whitened import Whitened
+from truearm.errors import Notice
+from truearm.fits.enough_values import FRAME_UNKNOWNS
+from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
+from truearm.lengths import length_mm
+from truearm.measurements import Measurements
+from truearm.robot import Robot
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED}
+MOSTLY: Final = 0.5
+"""Part of the squares that a step explains where a calibration does not help, or rows are outliers, for it to
+be the reason."""
+DIGITS: Final = 2
+OWN_GROUP: Final = (
+    "Give the rows behind a name of their own in a column `group`: each part then has a frame and a target "
+    "of its own."
+)
+ONE_PART: Final = (
+    "Rows of one arm are needed: calibrate from those behind alone, or, where these are few, from the "
+    "others, and bring that up to date with them (truearm update)."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Derivatives of n values of one set-up by what may stand otherwise.
+
+    Attributes:
+        setup: By the unknowns of the set-up, its frame first, if that is not known (n, W).
+        joints: By the joint values (n, N).
+        points: Which values are coordinates of points, x, y and z one after the other (n,).
+        frame: How many unknowns its frame has.
+        targets: How many targets there are.
+    """
+
+    setup: Floats
+    joints: Floats
+    points: Mask
+    frame: int
+    targets: int
+
+    @property
+    def columns(self) -> Floats:
+        """All of them (n, p), behind those by a shift of all points."""
+        shift = np.zeros((len(self.points), AXES))
+        shift[self.points] = np.tile(np.eye(AXES), (self.points.sum() // AXES, 1))
+        return np.hstack([shift, self.setup, self.joints])
+
+    def shapes(self) -> Iterator[Shape]:
+        """What of it may: all targets or one of them, one joint or all, the frame's turn."""
+        first, end = AXES + self.frame, AXES + self.setup.shape[1]
+        if self.frame == FRAME_UNKNOWNS:
+            yield Shape(FRAME, (), tuple(range(2 * AXES, first)))
+        yield Shape(TARGET, tuple(range(self.targets)), tuple(range(first, end)))
+        for target in range(self.targets if self.targets > 1 else 0):
+            own = first + AXES * target
+            yield Shape(TARGET, (target,), tuple(range(own, own + AXES)))
+        for joint in range(self.joints.shape[1]):
+            yield Shape(JOINT, (joint,), (end + joint,))
+        yield Shape(JOINT, tuple(range(self.joints.shape[1])), tuple(range(end, end + self.joints.shape[1])))
+
+    def way_mm(self, step: Step) -> float:
+        """How far a step moves points on average."""
+        by = (self.columns[:, list(step.shape.columns)] @ step.sizes)[self.points].reshape(-1, AXES)
+        lengths = np.linalg.norm(by, axis=1)
+        return float(MM_PER_METRE * lengths[lengths > 0.0].mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """Visits of one set-up in the order of measuring, v of them.
+
+    Attributes:
+        robot: The arm.
+        data: The measurements.
+        rows: Place of the first row of each visit among them (v,).
+        left: What is left of their values.
+        by: Derivatives of these.
+        others: Whether there are other set-ups.
+    """
+
+    robot: Robot
+    data: Measurements
+    rows: Rows
+    left: Left
+    by: Derivatives
+    others: bool = False
+
+    def step(self) -> Step | None:
+        """What stands otherwise from some visit on; None where poses tell the order, or change there too."""
+        poses = poses_of(self.robot, self.data.readings[self.rows])
+        if share_explained(poses, np.arange(float(len(poses)))) > FOLLOWED:
+            return None
+        shapes, columns = list(self.by.shapes()), self.by.columns
+        found = likeliest_step(self.left, columns, shapes, range(AXES), others=self.others)
+        if found is None or poses_change(poses, np.arange(float(len(poses))), (found.place - 1, found.place)):
+            return None
+        return found
+
+    def row(self, visit: int) -> str:
+        """The first row of a visit, in words."""
+        return self.data.row_names(np.arange(len(self.data)) == self.rows[visit])
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A step that is told.
+
+    Attributes:
+        notice: What it is, and what to do.
+        chance: How likely chance explains as much.
+        share: Part of what is left that it explains.
+    """
+
+    notice: Notice
+    chance: float
+    share: float
+
+
+def slips(found: Calibration, fitted: FittedRows, seen: Whitened, progress: Floats) -> list[Slip]:
+    """What stands otherwise from some row of a set-up on, of a calibration of what varies.
+
+    Where what slipped was taken for outliers, these tell it.
+
+    Args:
+        found: The calibration: constants leave too much that poses explain.
+        fitted: The rows that it was fitted to.
+        seen: What it leaves of them.
+        progress: When each was measured, from 0 for the first of its set-up to 1 for the last (n,).
+    """
+    told = _slips(found, fitted, seen)
+    return told if told or len(fitted.outliers()) < BESIDE else main_slips(found, fitted, progress)
+
+
+def main_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list[Slip]:
+    """Those that explain most of what is left, outliers included; arguments as of `slips`."""
+    seen = Whitened.of(found, fitted, progress, outliers=True)
+    return [slip for slip in _slips(found, fitted, seen) if slip.share > MOSTLY]
+
+
+def _slips(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Slip]:
+    if found.variable is None or found.options.drift == NO_DRIFT:
+        return []
+    return slips_of(list(_sessions(found, fitted, seen)))
+
+
+def slips_of(sessions: Sequence[Session]) -> list[Slip]:
+    """The step of each session that has one, in words, the most evident first.
+
+    Joints are those of one arm: what one set-up shows of them, others show as well.
+    """
+    found = [(step, session) for session in sessions if (step := session.step()) is not None]
+    told = list[Slip]()
+    for step, session in sorted(found, key=lambda pair: -pair[0].gain):
+        chance, kind = step.chance * len(sessions), KINDS[step.shape.what]
+        if chance < OVERWHELMING and not (told and kind == JOINT_MOVED):
+            told.append(Slip(Notice(kind, _words(session, step)), chance, step.share))
+    return told
+
+
+def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterator[Session]:
+    """Those of a calibration's set-ups."""
+    group, width = fitted.data.group[seen.rows], seen.left.shape[1]
+    frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS
+    pull = np.einsum("iab,ia->ib", seen.root, seen.left)
+    taken = seen.taken.reshape(len(group), width, len(group), width)
+    for name in found.groups:
+        own = np.flatnonzero(group == name)
+        if len(own) < 2 * BESIDE:
+            continue
+        root, count = seen.root[own], len(own) * width
+        blocks = np.zeros((len(own), width, len(own), width))
+        blocks[np.arange(len(own)), :, np.arange(len(own))] = root.transpose(0, 2, 1) @ root
+        alone = blocks.reshape(count, count)
+        known = np.einsum("iba,ibjc,jcd->iajd", root, taken[own][:, :, own], root, optimize=True)
+        visit = np.repeat(np.arange(len(own)), width)
+        left = Left(
+            pull[own].ravel(),
+            alone - known.reshape(count, count),
+            alone,
+            visit,
+            seen.square,
+            seen.freedom,
+        )
+        setup, joints = (each[own].reshape(count, -1) for each in (seen.setup, seen.joints))
+        points = np.ones(count, dtype=np.bool_)
+        by = Derivatives(setup, joints, points, frame, len(found.selection.targets))
+        yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
+
+
+def _words(session: Session, step: Step) -> str:
+    """What stands otherwise, from where on, by how much, and what to do."""
+    where = f"Between {session.row(step.place - 1)} and {session.row(step.place)}"
+    if step.place == 0:
+        where = f"In {session.data.group[session.rows[0]]}, against the other set-ups,"
+    if step.shape.what == TARGET:
+        return f"{where} {_of_target(session.by, step)}. {OWN_GROUP}"
+    far = length_mm(session.by.way_mm(step), DIGITS)
+    if step.shape.what == FRAME:
+        turn = float(MRAD_PER_RAD * np.linalg.norm(step.sizes))
+        return (
+            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by "
+            f"{far} on average). {OWN_GROUP}"
+        )
+    what, way_out = _of_joints(session, step)
+    return f"{where} {what}: points by {far} on average. {way_out}"
+
+
+def _of_target(by: Derivatives, step: Step) -> str:
+    """Which targets slipped, and how far."""
+    numbers = step.shape.numbers
+    by_mm = MM_PER_METRE * step.sizes[: AXES * len(numbers)].reshape(-1, AXES)
+    how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
+    if len(numbers) > 1:
+        return f"the targets slipped on the tool, or were put elsewhere on it, {how}"
+    axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
+    what = "the target" if by.targets == 1 else f"target {numbers[0] + 1}"
+    return (
+        f"{what} slipped on the tool, or was put elsewhere on it, {how} (along the flange's axes {axes} mm)"
+    )
+
+
+def _of_joints(session: Session, step: Step) -> tuple[str, str]:
+    """Which joints moved, and what to do: what frame or target of a set-up take over needs no more."""
+    numbers, by, joints = step.shape.numbers, session.by, session.robot.joints
+    sizes = [_moved_by(joints[joint], size) for joint, size in zip(numbers, step.sizes, strict=True)]
+    moved = f"joint {numbers[0] + 1} moved by {sizes[0]} against its reading"
+    if len(numbers) > 1:
+        each = ", ".join(f"{joint + 1} by {size}" for joint, size in zip(numbers, sizes, strict=True))
+        moved = f"joints moved against their readings ({each})"
+    if numbers == (0,) and by.frame:
+        return f"{moved}, or the measuring device about the same axis", OWN_GROUP
+    if numbers == (len(joints) - 1,) and by.targets == 1:
+        return f"{moved}, or the tool about the same axis", OWN_GROUP
+    return f"{moved}, as where one slips or is mastered anew", ONE_PART
+
+
+def _moved_by(joint: str, size: float) -> str:
+    """How far a joint moved, in words."""
+    return f"{MM_PER_METRE * size:+.3f} mm" if joint == "prismatic" else f"{np.degrees(size):+.4f} deg"
