@@ -17,6 +17,7 @@ from truearm.errors import InputError, WorkError, count_of
 from truearm.fits.endpoints import at_tool
 from truearm.kinds import required
 from truearm.limits import Limits, Task
+from truearm.named_values import check_readings
 from truearm.robot import Robot
 from truearm.solving import (
     as_seed,
@@ -208,6 +209,7 @@ class Compensator:
         """
         try:
             readings = as_numbers(q, what="joint readings")
+            check_readings(q, what="joint readings")
             if readings.ndim != 1:
                 raise ValueError(f"shape {readings.shape}: one waypoint has (N,), joints() takes many")
             corrected, refusal = self._corrector(self._tool(tool)).one(readings, self._features)

@@ -8,9 +8,9 @@ from typing import Final, TypeVar, get_args
 from truearm.description.robot_data import Joint
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.kinds import check_choice, words
+from truearm.named_values import JOINT
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
-JOINT: Final = re.compile(r"q([1-9]\d*)(?:_(rad|deg|m|mm))?")
 TARGET: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
 SIGMA: Final = re.compile(r"sigma(?:_(m|mm))?")
 DISTANCE: Final = re.compile(r"distance(?:_(m|mm))?")
