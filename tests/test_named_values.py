@@ -6,6 +6,7 @@ import pytest
 
 import truearm as ta
 from truearm.planning import AboveFloor, accessible
+from truearm.simulation import VirtualArm
 from truearm.streaming import CorrectionStream
 
 READING = np.radians([[10.0, -80.0, 90.0, -90.0, -80.0, 5.0]])
@@ -55,7 +56,7 @@ def test_readings_in_order_or_without_names_of_joints_are_taken(robot, given):
 
 
 def test_all_that_take_readings_look_at_their_names(robot):
-    arm = ta.simulation.VirtualArm(robot, seed=2)
+    arm = VirtualArm(robot, seed=2)
     found = ta.calibrate(robot, arm.measure(arm.poses(40)), model="constant")
     compensator = ta.Compensator(found)
     target = robot.pose(READING)
@@ -66,7 +67,7 @@ def test_all_that_take_readings_look_at_their_names(robot):
         lambda: compensator.correct(IN_DEGREES.iloc[0]),
         lambda: CorrectionStream(compensator).step(IN_DEGREES.iloc[0], 0.001),
         lambda: arm.measure(IN_DEGREES),
-        lambda: accessible(robot, IN_DEGREES, [AboveFloor()]),
+        lambda: accessible(robot, IN_DEGREES, [AboveFloor(0.0)]),
     ):
         with pytest.raises(ta.UsageError, match=r'"q1_deg", .*taken by place'):
             call()

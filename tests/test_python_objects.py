@@ -11,12 +11,14 @@ import pytest
 
 import truearm as ta
 from truearm import planning, streaming
+from truearm.cell.conformance import ConformanceError
 from truearm.compensation import TOOLS_KEPT
 from truearm.exporting import export
 from truearm.fits import identified
 from truearm.framing import find_object, find_tool
 from truearm.inverse import Inverse
 from truearm.proposing import Candidates, next_poses
+from truearm.serving.protocol import MalformedError
 from truearm.simulation import VirtualArm
 
 
@@ -140,6 +142,28 @@ def test_what_an_update_prints_counts_each_row_once(calibration, data):
     mean = found.calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 20 rows, {mean:.3g} mm mean on left-out rows>"
     assert repr(found.calibration) == words
+    revision = found.calibration.revision
+    assert repr(revision) == f"<Revision: {found.verdict}, the calibration before is kept>"
+    assert repr(revision.stripped()) == f"<Revision: {found.verdict}, the calibration before is left out>"
+    assert repr(revision.carried) == f"<Carried: {len(revision.carried.own)} unknowns, 60 values of rows>"
+    assert "covariance" not in repr(found.calibration.constant)
+
+
+def test_models_are_copied_and_sent_with_their_calibration(calibration):
+    models = copy.deepcopy(calibration.models)
+    assert models is not calibration.models
+    assert models == dict(calibration.models)
+    assert copy.copy(calibration.model) is calibration.model
+    with pytest.raises(ta.UsageError, match="Send the calibration, and take calibration.models from that"):
+        pickle.dumps(calibration.models)
+
+
+@pytest.mark.parametrize("kind", [ta.TruearmError, ta.InputError, MalformedError, ConformanceError])
+def test_all_errors_say_what_is_wrong_in_parts(kind):
+    error = sent(kind("2 mm", where="limits", rule="It is less than 1", way_out="Give less").at("a.toml"))
+    assert (type(error), error.what, error.where) == (kind, "2 mm", "a.toml, limits")
+    assert (error.rule, error.way_out) == ("It is less than 1", "Give less")
+    assert str(error) == "a.toml, limits: 2 mm. It is less than 1. Give less."
 
 
 @pytest.mark.parametrize("again", [sent, copy.copy, copy.deepcopy])
