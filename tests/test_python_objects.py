@@ -189,9 +189,12 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
     assert len(compensator._correctors) == TOOLS_KEPT
 
 
+def measured(robot):
+    return VirtualArm(robot, seed=2).measure_table(np.zeros((3, 6)))
+
+
 def counted_from_zero(robot):
-    table = VirtualArm(robot, seed=2).measure_table(np.zeros((3, 6)))
-    return table.rename(columns={f"q{k + 1}": f"q{k}" for k in range(6)})
+    return measured(robot).rename(columns={f"q{k + 1}": f"q{k}" for k in range(6)})
 
 
 api: Any = ta
@@ -338,6 +341,45 @@ WRONG = {
     "a time that no float holds": (
         lambda r, d, c: streams.CorrectionStream(api.Compensator(c)).step(None, 10**400),
         "elapsed_s is beyond 1.8e",
+    ),
+    "a table called by a number": (
+        lambda r, d, c: api.Measurements.from_dataframe(counted_from_zero(r), name=5),
+        "name is 5. It must be a text",
+    ),
+    "a number of joints in words": (
+        lambda r, d, c: d.require_joint_count("6"),
+        "joint_count is '6'. It must be a whole number",
+    ),
+    "one kind of joint for all": (
+        lambda r, d, c: api.Measurements.from_dataframe(measured(r), joints="revolute"),
+        "there are 6 joint columns. The robot has 1 joint. ",
+    ),
+    "a target in words": (
+        lambda r, d, c: c.position(d.readings, group=c.groups[0], target="1"),
+        "target is '1'. It must be a whole number",
+    ),
+    "rows one by one": (lambda r, d, c: list(d), r"One row is said by \[0\]; to go through them all, take"),
+    "a controller of a robot by name": (
+        lambda r, d, c: api.Controller.declared("nominal", "ur10"),
+        "the robot is of type str.*Robot.load",
+    ),
+    "a file's controller of a robot by name": (
+        lambda r, d, c: api.Controller.load("arm.toml", robot="ur10"),
+        "the robot is of type str.*Robot.load",
+    ),
+    "no robot file": (lambda r, d, c: api.Robot.from_toml(None), "robot: the text is of type NoneType"),
+    "names in a set": (
+        lambda r, d, c: api.Options(features={"b"}),
+        "features is {'b'}. It must be a list of names, as a set has no order",
+    ),
+    "columns in a set": (
+        lambda r, d, c: api.SplitRule(split_by=frozenset({"b"})),
+        "It must be a list of names, as a set has no order",
+    ),
+    "a robot without a name": (lambda r, d, c: replace(r, name=""), "name: ''. The name is a text that is"),
+    "a robot called by a number": (
+        lambda r, d, c: api.Robot.from_table(5, np.zeros((2, 4))),
+        "name: 5. The name is a text that is not empty",
     ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),

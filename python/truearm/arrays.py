@@ -234,6 +234,9 @@ def as_row_numbers(index: ArrayLike | slice, count: int) -> NDArray[np.int64]:
         raise InputError(
             f"{given.dtype} of shape {given.shape} says no rows",
             rule=f"Rows are said by a boolean mask of {count}, a slice, or row numbers from 0 to {count - 1}",
+            way_out=f"One row is said by [{index}]; to go through them all, take the arrays, as data.readings"
+            if whole and given.ndim == 0
+            else "",
         )
     if given.dtype.kind == "b":
         return np.flatnonzero(given)

@@ -127,6 +127,8 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
     Raises:
         InputError: If it is none.
     """
+    if not isinstance(text, str):
+        raise UsageError(f"the text is of type {type(text).__name__}", where=where, rule="TOML is a text")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
