@@ -237,6 +237,14 @@ WRONG = {
         lambda r, d, c: api.compensate_program("a.src", c),
         "Compensator is",
     ),
+    "a program that is not there": (
+        lambda r, d, c: api.compensate_program("none.script", api.Compensator(c)),
+        "none.script: there is no such file",
+    ),
+    "a program's name that is none": (
+        lambda r, d, c: api.compensate_program(None, api.Compensator(c)),
+        "the file is of type NoneType",
+    ),
     "a tool in words": (
         lambda r, d, c: c.position(d.readings, tool="gripper"),
         "entries of the tool are not real numbers",

@@ -78,6 +78,12 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def check_is_there(path: Path) -> None:
+    """Raise InputError, as `read_bytes` does, where there is no such file or it is a directory."""
+    if not is_file(path) and not path.is_fifo():
+        read_bytes(path)
+
+
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without byte order mark.
 
