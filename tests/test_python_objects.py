@@ -142,7 +142,7 @@ def test_what_an_update_prints_counts_each_row_once(calibration, data):
     mean = found.calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 20 rows, {mean:.3g} mm mean on left-out rows>"
     assert repr(found.calibration) == words
-    revision = found.calibration.revision
+    revision: Any = found.calibration.revision
     assert repr(revision) == f"<Revision: {found.verdict}, the calibration before is kept>"
     assert repr(revision.stripped()) == f"<Revision: {found.verdict}, the calibration before is left out>"
     assert repr(revision.carried) == f"<Carried: {len(revision.carried.own)} unknowns, 60 values of rows>"
