@@ -78,10 +78,16 @@ def is_file(path: Path) -> bool:
         return False
 
 
-def check_is_there(path: Path) -> None:
-    """Raise InputError, as `read_bytes` does, where there is no such file or it is a directory."""
+def existing(given: object) -> Path:
+    """The path of a file that is there, as `as_path`.
+
+    Raises:
+        InputError: As :func:`read_bytes`, if there is none.
+    """
+    path = as_path(given)
     if not is_file(path) and not path.is_fifo():
         read_bytes(path)
+    return path
 
 
 def read_text(path: Path) -> str:

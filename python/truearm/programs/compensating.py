@@ -8,7 +8,7 @@ from typing import Any
 from truearm.compensation import Compensator
 from truearm.controller import Controller
 from truearm.errors import UsageError
-from truearm.files import as_path, check_is_there
+from truearm.files import existing
 from truearm.inverse import Inverse
 from truearm.kinds import required
 from truearm.programs.declaring import declared_controller, refuse_another_arm, refuse_contradiction
@@ -64,9 +64,7 @@ def compensate_program(
     chosen = required(choices or Choices(), Choices, "the choices")
     compensator = required(compensator, Compensator, "the compensator")
     calibration, author = compensator.calibration, compensator.programming
-    file = as_path(path)
-    check_is_there(file)
-    written_in = language_of(file, chosen.language)
+    written_in = language_of(file := existing(path), chosen.language)
     declared = _declared(controller, written_in, calibration.robot)
     refuse_another_arm(declared, calibration.robot)
     known = _frames(frames).fresh()
