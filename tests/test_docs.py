@@ -229,6 +229,12 @@ def test_generated_pages_are_current(name, monkeypatch):
     assert maker.PAGE.read_text() == maker.page(), f"run: make docs, or python docs/{name}.py"
 
 
+def test_files_of_the_package_that_decisions_name_are_there():
+    texts = [path.read_text() for path in (ROOT / "docs" / "decisions").glob("*.md")]
+    named = {name for text in texts for name in re.findall(r"python/truearm/[\w/]+\.py", text)}
+    assert {name for name in named if not (ROOT / name).exists()} == set()
+
+
 def test_schemas_are_current():
     maker = load_script("make_schemas")
     found = {path.name: path.read_text() for path in maker.FOLDER.glob("*.json")}
