@@ -48,6 +48,7 @@ def _cell() -> dict[str, Any]:
             section = getattr(import_module(module), attribute).Settings.model_json_schema()
             definitions |= section.pop("$defs", {})
             section["properties"]["driver"] = {"const": name}
+            section["required"] = sorted({*section.get("required", ()), "driver"})
             choices.append({**section, "title": name})
         own = {"properties": {"driver": {"type": "string", "pattern": ":"}}, "required": ["driver"]}
         schema["properties"][key] = {"anyOf": [*choices, {**own, "title": "a driver of your own"}]}

@@ -12,12 +12,14 @@ from truearm.cell import Cell
 from truearm.cell.cell_file import FaultsSection
 from truearm.cell.drivers import ROBOTS, driver_and_settings
 from truearm.cell.examples import EXAMPLES, example
+from truearm.cell.motion import Motion
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
 from truearm.cell.sequence import steps_of
 from truearm.cell.session import Session, Step
 from truearm.cli.cell_simulate import FAULTS
 from truearm.errors import InputError, WorkError
+from truearm.planning import ClearOfItself
 from truearm.robot import Robot
 from truearm.rotations import transform_from_parts
 
@@ -30,6 +32,12 @@ def cell():
 @pytest.fixture(scope="module")
 def poses(cell):
     return poses_of(cell, 8)
+
+
+def test_links_may_meet_where_the_cell_says_they_have_no_thickness():
+    cell = Cell.from_toml(cell_text() + "\n[clearance]\nlink_radius_mm = 0\n")
+    motion = Motion.of(cell.arm, cell, [], [cell.flange_from_target], None)
+    assert not any(isinstance(rule, ClearOfItself) for rule in motion.rules)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -47,11 +55,17 @@ def test_examples_are_cells(name):
         ('driver = "rv-m2"', 'driver = "truearm.robot:Robot"', "has no class Settings"),
         ('port = "/dev/ttyS0"', "", 'robot: key "port" is missing'),
         ('port = "/dev/ttyS0"', 'port = "/dev/ttyS0"\nspeed = 12', "robot, speed: 12 cannot be used"),
+        ('port = "/dev/ttyS0"', 'port = "/dev/ttyS0"\nbaud = "9600"', "robot, baud: '9600' cannot be used"),
         ('port = "/dev/ttyS0"', 'prt = "/dev/ttyS0"', 'unknown key "prt". Did you mean "port"'),
         ("expected_mm = 4", "expected_mm = -4", "process, expected_mm: -4 cannot be used"),
         ("expected_mm = 4", 'expected_mm = "four"', "Must be a number"),
         ("expected_mm = 4", "contacs = 4", 'Did you mean "contacts"'),
-        ("xyz_mm = [400, -250, -100]", "xyz_mm = [400, -250]", "world, xyz_mm, 3"),
+        ("xyz_mm = [400, -250, -100]", "xyz_mm = [400, -250]", r"xyz_mm: \[400, -250\] .* have 3 values"),
+        ("xyz_mm = [400, -250, -100]", "xyz_mm = [4, 5, 6, 7]", "world, xyz_mm: .* It must have 3 values"),
+        ("expected_mm = 4", 'expected_mm = "4"', "expected_mm: '4' cannot be used. Must be a number"),
+        ("expected_mm = 4", "together = 1", "process, together: 1 cannot be used. Must be true or false"),
+        ("expected_mm = 4", "expected_mm = 2020-01-01", "expected_mm: .* Must be a number"),
+        ("expected_mm = 4", 'model = "varable"', "Either constant or variable.*Did you mean"),
         ("uncertain_mm = 6", "quaternion_wxyz = [1, 1, 0, 0]", "length 1.41421, must be 1"),
         ('arm = "rv-m2"', 'arm = "rv-m3"', "rv-m2"),
         ('arm = "rv-m2"', 'arm = "ur10"', "five turning joints"),

@@ -31,6 +31,7 @@ from truearm.cell.session_schema import SCHEMA
 from truearm.cli import COMMANDS, main
 from truearm.description.robot_file import RobotFile
 from truearm.doubts import of_results as doubts
+from truearm.fits.options import CHOICES
 from truearm.fleet import Fleet, running
 from truearm.judgement import validation
 from truearm.programs.frames import FramesFile
@@ -228,10 +229,30 @@ def test_generated_pages_are_current(name, monkeypatch):
     assert maker.PAGE.read_text() == maker.page(), f"run: make docs, or python docs/{name}.py"
 
 
+def test_files_of_the_package_that_decisions_name_are_there():
+    texts = [path.read_text() for path in (ROOT / "docs" / "decisions").glob("*.md")]
+    named = {name for text in texts for name in re.findall(r"python/truearm/[\w/]+\.py", text)}
+    assert {name for name in named if not (ROOT / name).exists()} == set()
+
+
 def test_schemas_are_current():
     maker = load_script("make_schemas")
     found = {path.name: path.read_text() for path in maker.FOLDER.glob("*.json")}
     assert found == {name: maker.text_of(schema) for name, schema in maker.schemas().items()}, "make docs"
+
+
+def test_schemas_tell_what_readers_ask_for():
+    schemas = load_script("make_schemas").schemas()
+    for key in ("robot", "sensor"):
+        choices = schemas["cell.json"]["properties"][key]["anyOf"]
+        assert all("driver" in choice["required"] for choice in choices)
+    for part in ("defaults", "arm"):
+        section = schemas["fleet.json"]["properties"][part]
+        keys = section.get("items", section)["properties"]
+        for name in CHOICES.keys() & keys.keys():
+            assert keys[name]["enum"] == [choice for choice in CHOICES[name] if choice is not None]
+        assert (keys["holdout"]["exclusiveMaximum"], keys["seed"]["minimum"]) == (1, 0)
+        assert keys["length_unit"]["anyOf"][0]["enum"] == ["m", "mm"]
 
 
 def test_every_column_of_a_session_is_explained():

@@ -1,6 +1,7 @@
 """Fleets with arms whose distances were measured, whose errors are not those of positions."""
 
 import csv
+import re
 from typing import Any
 
 import pytest
@@ -34,6 +35,13 @@ def test_what_errors_are_of_stands_in_every_table():
     for kind in kinds.values():
         assert f"nominal, {kind}" in page
         assert f"The largest {kind} error is that of" in page
+    symbols = dict(re.findall(r'"name":"(\w+, \w+)".*?"symbol":"([a-z-]+)"', page))
+    assert symbols == {
+        "nominal, position": "diamond-open",
+        "calibrated, position": "circle",
+        "nominal, distance": "diamond",
+        "calibrated, distance": "circle-open",
+    }
 
 
 @pytest.mark.parametrize(

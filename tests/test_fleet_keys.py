@@ -43,3 +43,18 @@ def test_what_an_arm_fails_with_names_keys(tmp_path, monkeypatch):
 def test_options_that_contradict_each_other_in_a_fleet_file_name_keys():
     with pytest.raises(InputError, match='Leave them out, or model = "variable"'):
         Fleet.from_toml(f'{FLEET}model = "constant"\nfeatures = ["load"]\n')
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('length_unit = "in"', 'length_unit: "in" is not known. Either m or mm'),
+        ('angle_unit = "grad"', 'angle_unit: "grad" is not known. Either rad or deg. Did you mean "rad"'),
+        ('strip = "yes"', "strip: 'yes' cannot be used. Must be true or false"),
+    ],
+)
+def test_what_an_arm_is_read_by_is_checked_with_the_file(line, words):
+    with pytest.raises(InputError, match=f'fleet.toml, arm "R1", {words}'):
+        Fleet.from_toml(f"{FLEET}{line}\n", where="fleet.toml")
+    with pytest.raises(InputError, match=f"fleet.toml, defaults, {words}"):
+        Fleet.from_toml(FLEET.replace("[[arm]]", f"{line}\n[[arm]]"), where="fleet.toml")

@@ -9,6 +9,7 @@ import truearm as ta
 from tests.programs_rig import ABB, KUKA, models, read, rewritten
 from tests.test_programs_krl import pose_text
 from tests.test_programs_rapid import GO, SEEN, module, numbers, points
+from truearm.errors import InputError
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.notices import frames_notices
@@ -245,3 +246,9 @@ def test_the_measured_point_is_known_by_positions_alone(tmp_path, positions_alon
     unasked = notices_of(path, positions_alone, measured + "[object.wTable]\nxyz = [1, 2, 3]\n")
     assert [notice.kind for notice in unasked] == ["frames"]
     assert 'work object "wTable" of cell.toml' in unasked[0].message
+
+
+@pytest.mark.parametrize("xyz", ["[true, 2, 3]", '[1, "2", 3]'])
+def test_text_and_truth_are_no_numbers_of_a_frame(xyz):
+    with pytest.raises(InputError, match=r'"tool.a.xyz.[01]" is wrong: Input should be a valid number'):
+        Frames.parse(f"[tool.a]\nxyz = {xyz}")

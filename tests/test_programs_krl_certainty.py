@@ -141,6 +141,29 @@ def test_what_is_called_anywhere_in_a_line_may_set_tool_or_base(line):
         assert changed(src) == [True, False]
 
 
+@pytest.mark.parametrize(
+    ("line", "base"),
+    [
+        ("TRIGGER WHEN DISTANCE=1 DELAY=0 DO $BASE.Z=150", ""),
+        ("TRIGGER WHEN PATH=0 DELAY=-10 DO $TOOL={X 0,Y 50,Z 100,A 0,B 0,C 0}", ""),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO BASE_DATA[2].Z=150", "$BASE=BASE_DATA[2]"),
+        ("aim()", ""),
+    ],
+)
+def test_what_a_trigger_assigns_may_be_another_tool_or_base(line, base):
+    aim = "DEF aim()\nTRIGGER WHEN DISTANCE=1 DELAY=0 DO $BASE=$NULLFRAME\nEND\n"
+    src = f"{ALREADY}PTP {HERE}\n{line}\nPTP {HERE}\n{base}\nPTP {THERE}\nEND\n{aim}"
+    found = changed(src, "BASE_DATA[2]={X 1,Y 0,Z 0,A 0,B 0,C 0}\n")
+    assert (found[0], found[2]) == (True, False)
+
+
+def test_what_an_interrupt_assigns_is_not_known_behind_it():
+    declared = "INTERRUPT DECL 3 WHEN $IN[1] DO $TOOL={X 0,Y 50,Z 100,A 0,B 0,C 0}"
+    assert changed(f"{ALREADY}PTP {HERE}\n{declared}\nPTP {THERE}\nEND\n") == [True, False]
+    kept = "GLOBAL INTERRUPT DECL 3 WHEN $IN[1] DO $OUT[2]=TRUE"
+    assert changed(f"{ALREADY}PTP {HERE}\n{kept}\nPTP {THERE}\nEND\n") == [True, True]
+
+
 def test_a_trigger_sets_its_tool_or_base_after_the_motion_that_it_belongs_to():
     src = f"{ALREADY}TRIGGER WHEN DISTANCE=1 DELAY=0 DO SET_IT()\nPTP {HERE}\nPTP {THERE}\nEND\n"
     assert changed(src) == [True, False]
@@ -208,6 +231,8 @@ def test_a_frame_that_may_be_changed_elsewhere(line):
         ("$WORLD.Z=120", "$WORLD is set in line "),
         ("$ERSYSROOT=FOUND", "$ERSYSROOT is set in line "),
         ("LEVEL($ROBROOT)", "$ROBROOT is given to a subroutine"),
+        ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $WORLD={X 0,Y 0,Z 9,A 0,B 0,C 0}", "$WORLD is set in line "),
+        ("INTERRUPT DECL 3 WHEN $IN[1] DO $ROBROOT.Z=300", "$ROBROOT is set in line "),
     ],
 )
 def test_a_program_that_moves_the_world_leaves_all_that_is_told_in_it(line, told):

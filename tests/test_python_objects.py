@@ -11,12 +11,14 @@ import pytest
 
 import truearm as ta
 from truearm import planning, streaming
+from truearm.cell.conformance import ConformanceError
 from truearm.compensation import TOOLS_KEPT
 from truearm.exporting import export
 from truearm.fits import identified
 from truearm.framing import find_object, find_tool
 from truearm.inverse import Inverse
 from truearm.proposing import Candidates, next_poses
+from truearm.serving.protocol import MalformedError
 from truearm.simulation import VirtualArm
 
 
@@ -140,6 +142,28 @@ def test_what_an_update_prints_counts_each_row_once(calibration, data):
     mean = found.calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 20 rows, {mean:.3g} mm mean on left-out rows>"
     assert repr(found.calibration) == words
+    revision: Any = found.calibration.revision
+    assert repr(revision) == f"<Revision: {found.verdict}, the calibration before is kept>"
+    assert repr(revision.stripped()) == f"<Revision: {found.verdict}, the calibration before is left out>"
+    assert repr(revision.carried) == f"<Carried: {len(revision.carried.own)} unknowns, 60 values of rows>"
+    assert "covariance" not in repr(found.calibration.constant)
+
+
+def test_models_are_copied_and_sent_with_their_calibration(calibration):
+    models = copy.deepcopy(calibration.models)
+    assert models is not calibration.models
+    assert models == dict(calibration.models)
+    assert copy.copy(calibration.model) is calibration.model
+    with pytest.raises(ta.UsageError, match="Send the calibration, and take calibration.models from that"):
+        pickle.dumps(calibration.models)
+
+
+@pytest.mark.parametrize("kind", [ta.TruearmError, ta.InputError, MalformedError, ConformanceError])
+def test_all_errors_say_what_is_wrong_in_parts(kind):
+    error = sent(kind("2 mm", where="limits", rule="It is less than 1", way_out="Give less").at("a.toml"))
+    assert (type(error), error.what, error.where) == (kind, "2 mm", "a.toml, limits")
+    assert (error.rule, error.way_out) == ("It is less than 1", "Give less")
+    assert str(error) == "a.toml, limits: 2 mm. It is less than 1. Give less."
 
 
 @pytest.mark.parametrize("again", [sent, copy.copy, copy.deepcopy])
@@ -165,9 +189,12 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
     assert len(compensator._correctors) == TOOLS_KEPT
 
 
+def measured(robot):
+    return VirtualArm(robot, seed=2).measure_table(np.zeros((3, 6)))
+
+
 def counted_from_zero(robot):
-    table = VirtualArm(robot, seed=2).measure_table(np.zeros((3, 6)))
-    return table.rename(columns={f"q{k + 1}": f"q{k}" for k in range(6)})
+    return measured(robot).rename(columns={f"q{k + 1}": f"q{k}" for k in range(6)})
 
 
 api: Any = ta
@@ -209,6 +236,14 @@ WRONG = {
     "a program without compensator": (
         lambda r, d, c: api.compensate_program("a.src", c),
         "Compensator is",
+    ),
+    "a program that is not there": (
+        lambda r, d, c: api.compensate_program("none.script", api.Compensator(c)),
+        "none.script: there is no such file",
+    ),
+    "a program's name that is none": (
+        lambda r, d, c: api.compensate_program(None, api.Compensator(c)),
+        "the file is of type NoneType",
     ),
     "a tool in words": (
         lambda r, d, c: c.position(d.readings, tool="gripper"),
@@ -314,6 +349,45 @@ WRONG = {
     "a time that no float holds": (
         lambda r, d, c: streams.CorrectionStream(api.Compensator(c)).step(None, 10**400),
         "elapsed_s is beyond 1.8e",
+    ),
+    "a table called by a number": (
+        lambda r, d, c: api.Measurements.from_dataframe(counted_from_zero(r), name=5),
+        "name is 5. It must be a text",
+    ),
+    "a number of joints in words": (
+        lambda r, d, c: d.require_joint_count("6"),
+        "joint_count is '6'. It must be a whole number",
+    ),
+    "one kind of joint for all": (
+        lambda r, d, c: api.Measurements.from_dataframe(measured(r), joints="revolute"),
+        "there are 6 joint columns. The robot has 1 joint. ",
+    ),
+    "a target in words": (
+        lambda r, d, c: c.position(d.readings, group=c.groups[0], target="1"),
+        "target is '1'. It must be a whole number",
+    ),
+    "rows one by one": (lambda r, d, c: list(d), r"One row is said by \[0\]; to go through them all, take"),
+    "a controller of a robot by name": (
+        lambda r, d, c: api.Controller.declared("nominal", "ur10"),
+        "the robot is of type str.*Robot.load",
+    ),
+    "a file's controller of a robot by name": (
+        lambda r, d, c: api.Controller.load("arm.toml", robot="ur10"),
+        "the robot is of type str.*Robot.load",
+    ),
+    "no robot file": (lambda r, d, c: api.Robot.from_toml(None), "robot: the text is of type NoneType"),
+    "names in a set": (
+        lambda r, d, c: api.Options(features={"b"}),
+        "features is {'b'}. It must be a list of names, as a set has no order",
+    ),
+    "columns in a set": (
+        lambda r, d, c: api.SplitRule(split_by=frozenset({"b"})),
+        "It must be a list of names, as a set has no order",
+    ),
+    "a robot without a name": (lambda r, d, c: replace(r, name=""), "name: ''. The name is a text that is"),
+    "a robot called by a number": (
+        lambda r, d, c: api.Robot.from_table(5, np.zeros((2, 4))),
+        "name: 5. The name is a text that is not empty",
     ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),

@@ -15,6 +15,8 @@ from truearm.reporting.curves import in_words
 from truearm.reporting.facts import Facts
 from truearm.reporting.levers import taken_over
 from truearm.reporting.numbers import fixed, without_zeros
+from truearm.reporting.page import page
+from truearm.reporting.parts import Head
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -108,6 +110,15 @@ def test_a_report_on_distances_names_one_point_and_compares_no_error_with_it():
     assert "of the flange, as the robot file names no tool)" in text
     assert "robot file's tool" not in text
     assert "known worse" not in text
+    assert "Measure to further fixed points. These errors are of distances" in text
+
+
+def test_no_line_ends_within_the_name_of_an_option():
+    advice = [("Use it.", "Say <--use-pose pose>, or --holdout 0.25: not -- as a dash-")]
+    drawn = page(Head(title="Report", about="an arm", advice=advice), [])
+    told = "Say &lt;<code>--use-pose</code> pose&gt;, or <code>--holdout</code> 0.25: not -- as a dash-"
+    assert told in drawn
+    assert re.search(r"code \{[^}]*white-space: nowrap", drawn)
 
 
 def test_arrows_and_arm_lie_within_the_axes_that_the_page_fits_into_view(drawn):

@@ -78,6 +78,7 @@ BAD = {
     "one limit": ("[-90.0, 90.0]", "[90.0]", "link 1, limits: .*Must have 2 entries"),
     "three limits": ("[-90.0, 90.0]", "[1.0, 2.0, 3.0]", "link 1, limits: .*Must have 2 entries"),
     "limits not a list": ("[-90.0, 90.0]", "90.0", "link 1, limits: 90.0 cannot be used. Must be a list"),
+    "direction true": ("alpha = 90.0", "direction = true", "link 2, direction: true is no direction"),
     "direction": ("alpha = 90.0", "direction = 2", "link 2, direction: 2 is not known. Must be 1 or -1"),
     "quaternion length": (
         "[1.0, 0.0, 0.0, 0.0]",

@@ -238,3 +238,11 @@ def test_measurements_in_the_place_of_a_robot_are_told(tmp_path: Path) -> None:
     path.write_text("q1,x,y,z\n0,1,2,3\n")
     with pytest.raises(InputError, match="table of measurements.*calibrate ROBOT MEASUREMENTS"):
         Robot.load(path)
+
+
+def test_a_urdf_that_names_no_robot_is_called_after_its_file():
+    joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{}</joint>'
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    text = f'<robot><link name="a"/><link name="b"/>{joint.format(limit)}</robot>'
+    found = Robot.from_urdf_text(text, where="arm.urdf")
+    assert Robot.from_toml(found.to_toml()).name == "arm.urdf"

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError, list_rows
+from truearm.named_values import check_readings
 
 RIGID_WITHIN: Final = 1e-8
 """How far R^T R of a rotation may be from the identity, as in the core; a last row may be as far off."""
@@ -62,7 +63,7 @@ def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.f
     """`values` (n, columns) or (columns,) as a C-contiguous (n, columns) array.
 
     Args:
-        values: Anything NumPy makes numbers of.
+        values: Anything NumPy makes numbers of; columns called q1, q2, ... are to be in order.
         columns: Number of columns it must have.
         what: What the values are, for messages, such as "joint readings".
 
@@ -71,6 +72,7 @@ def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.f
 
     Raises:
         InputError: If these are no numbers, the shape is another, or a value is not finite.
+        UsageError: If columns of a table have names of joints in another order or unit.
     """
     array = as_numbers(values, what=what)
     single = np.ndim(values) == 1
@@ -80,6 +82,7 @@ def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.f
             f"{what} have shape {np.shape(values)}",
             rule=f"The shape must be (n, {columns}), or ({columns},) for one",
         )
+    check_readings(values, what=what)
     check_finite(rows, what=what)
     return rows, single
 
@@ -231,6 +234,9 @@ def as_row_numbers(index: ArrayLike | slice, count: int) -> NDArray[np.int64]:
         raise InputError(
             f"{given.dtype} of shape {given.shape} says no rows",
             rule=f"Rows are said by a boolean mask of {count}, a slice, or row numbers from 0 to {count - 1}",
+            way_out=f"One row is said by [{index}]; to go through them all, take the arrays, as data.readings"
+            if whole and given.ndim == 0
+            else "",
         )
     if given.dtype.kind == "b":
         return np.flatnonzero(given)

@@ -315,7 +315,7 @@ class Calibration:
         task: Task = "pose",
         features: Mapping[str, float] | None = None,
     ) -> Floats:
-        """Inverse kinematics of the calibrated arm: readings for poses, on the branch and turn of a seed.
+        """Inverse kinematics of the calibrated arm: readings for poses, near a seed and on its branch.
 
         Args:
             base_from_tool: Targets (n, 4, 4), or (4, 4) for one.
@@ -330,7 +330,7 @@ class Calibration:
             Readings (n, N), or (N,) for one pose.
 
         Raises:
-            WorkError: If a pose cannot be reached within the joint limits, or only on another branch.
+            WorkError: If a pose is not reached within the joint limits, or on another branch than the seed's.
             InputError: If targets, seed or tool are none.
         """
         return solve(self, base_from_tool, seed, tool=tool, task=task, features=features)

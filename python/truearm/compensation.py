@@ -17,6 +17,7 @@ from truearm.errors import InputError, WorkError, count_of
 from truearm.fits.endpoints import at_tool
 from truearm.kinds import required
 from truearm.limits import Limits, Task
+from truearm.named_values import check_readings
 from truearm.robot import Robot
 from truearm.solving import (
     as_seed,
@@ -24,6 +25,7 @@ from truearm.solving import (
     core_options,
     feature_names,
     feature_values,
+    left_branch,
     moving_joints,
     plain_model,
 )
@@ -182,7 +184,9 @@ class Compensator:
         Args:
             base_from_tool: Targets (n, 4, 4), or (4, 4) for one, which is a path of one as in `joints`.
             seed: Readings (n, N), near which the solution of each target is looked for; or (N,), near which
-                that of the first is, and of each other one near the one before. Branch and turn are kept.
+                that of the first is, and of each other one near the one before. A solution on another branch
+                is refused: there the Jacobian's determinant has another sign, or the branch, of an arm that
+                can name it, another name. On which turn a joint is, the search from the seed tells.
             tool: As for `joints`.
 
         Raises:
@@ -196,7 +200,9 @@ class Compensator:
             rows, _, refused = solver.solve(poses, seeds, [])
         except CoreError as error:
             raise InputError(str(error)) from None
-        unsolved = {place: Refusal(place + 1, reason, code) for place, code, reason in refused}
+        strays = left_branch(self.programming, self.task, rows, seeds)
+        rows[[place for place, _, _ in strays]] = np.nan
+        unsolved = {place: Refusal(place + 1, reason, code) for place, code, reason in [*refused, *strays]}
         return self._corrected(rows, flange_from_tool, unsolved)
 
     def correct(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Floats:
@@ -208,6 +214,7 @@ class Compensator:
         """
         try:
             readings = as_numbers(q, what="joint readings")
+            check_readings(q, what="joint readings")
             if readings.ndim != 1:
                 raise ValueError(f"shape {readings.shape}: one waypoint has (N,), joints() takes many")
             corrected, refusal = self._corrector(self._tool(tool)).one(readings, self._features)

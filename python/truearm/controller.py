@@ -12,6 +12,7 @@ from truearm.errors import InputError, list_names
 from truearm.files import read_text
 from truearm.fits.endpoints import at_tool
 from truearm.inverse import Inverse
+from truearm.kinds import required
 from truearm.robot import URDF_ENDINGS, Robot
 from truearm.ur_kinematics import robot_from_conf, robot_from_yaml
 
@@ -38,6 +39,9 @@ class Controller:
     kind: Literal["nominal", "factory"] = "nominal"
     source: str = ""
 
+    def __post_init__(self) -> None:
+        required(self.robot, Robot, "the robot")
+
     @classmethod
     def nominal(cls, robot: Robot) -> "Controller":
         """A controller that computes with the nominal table."""
@@ -57,6 +61,8 @@ class Controller:
             InputError: If there is no such file, it is none of these, or it is of another kind of arm.
         """
         given = str(path)
+        if robot is not None:
+            required(robot, Robot, "the robot")
         found = _read(Path(given.partition("#")[0]), given, robot)
         if robot is not None and found.joints != robot.joints:
             raise InputError(

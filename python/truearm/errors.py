@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from truearm.lengths import how_far
 
@@ -19,17 +19,13 @@ OUTLIERS_NAMED = 5
 
 
 class TruearmError(Exception):
-    """Base of all errors that truearm raises on purpose."""
-
-
-class InputError(TruearmError):
-    """A file or a value that cannot be used.
+    """Base of all errors that truearm raises on purpose.
 
     Attributes:
         what: What was found, with the value.
         where: File, key, column or argument; empty when there is none.
-        rule: What it should have been.
-        way_out: What the user can do about it.
+        rule: What it should have been; empty where nothing more is to be said.
+        way_out: What the user can do about it; empty where nothing more is to be said.
     """
 
     def __init__(self, what: str, *, where: str = "", rule: str = "", way_out: str = "") -> None:
@@ -40,10 +36,14 @@ class InputError(TruearmError):
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.what, self.where, self.rule, self.way_out)
 
-    def at(self, where: str) -> "InputError":
+    def at(self, where: str) -> Self:
         """The same error, found in `where`; a place it already names stays behind it."""
         place = f"{where}, {self.where}" if self.where else where
         return type(self)(self.what, where=place, rule=self.rule, way_out=self.way_out)
+
+
+class InputError(TruearmError):
+    """A file or a value that cannot be used."""
 
 
 class UsageError(InputError):
@@ -165,5 +165,5 @@ def _sentence(text: str) -> str:
     return text if text.endswith((".", "?", "!", ":")) else f"{text}."
 
 
-def _rebuild(kind: type[InputError], what: str, where: str, rule: str, way_out: str) -> InputError:
+def _rebuild(kind: type[TruearmError], what: str, where: str, rule: str, way_out: str) -> TruearmError:
     return kind(what, where=where, rule=rule, way_out=way_out)

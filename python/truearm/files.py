@@ -78,6 +78,18 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def existing(given: object) -> Path:
+    """The path of a file that is there, as `as_path`.
+
+    Raises:
+        InputError: As :func:`read_bytes`, if there is none.
+    """
+    path = as_path(given)
+    if not is_file(path) and not path.is_fifo():
+        read_bytes(path)
+    return path
+
+
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without byte order mark.
 
@@ -127,6 +139,8 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
     Raises:
         InputError: If it is none.
     """
+    if not isinstance(text, str):
+        raise UsageError(f"the text is of type {type(text).__name__}", where=where, rule="TOML is a text")
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
 from truearm.joined_tables import join_tables
 from truearm.measurements import Measurements
+from truearm.named_values import JOINT
 from truearm.tables.columns import (
     DISTANCE,
-    JOINT,
     QUATERNION,
     SIGMA,
     TARGET,

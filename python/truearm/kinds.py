@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, Final, TypeVar
@@ -132,13 +132,21 @@ def words(value: object, name: str) -> tuple[str, ...]:
     """
     if isinstance(value, str):
         return tuple(part.strip() for part in value.split(","))
-    if not isinstance(value, Iterable) or isinstance(value, bytes):
-        raise UsageError(f"{name} is {value!r}", rule="It must be a list of names")
-    found = tuple(value)
-    for part in found:
-        if not isinstance(part, str):
-            raise UsageError(f"a name of {name} is {part!r}", rule="It must be a text")
-    return tuple(str(part) for part in found)
+    if not isinstance(value, Iterable) or isinstance(value, bytes | set | frozenset):
+        rule = "It must be a list of names" + (", as a set has no order" if isinstance(value, Set) else "")
+        raise UsageError(f"{name} is {value!r}", rule=rule)
+    return tuple(text(part, f"a name of {name}") for part in value)
+
+
+def text(value: object, name: str) -> str:
+    """The argument or option `name`, which is a text.
+
+    Raises:
+        UsageError: If it is anything else.
+    """
+    if not isinstance(value, str):
+        raise UsageError(f"{name} is {value!r}", rule="It must be a text")
+    return str(value)
 
 
 def content_bytes(content: object, noun: str) -> bytes:

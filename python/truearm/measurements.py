@@ -12,9 +12,10 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, as_row_numbers, read_only
-from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
+from truearm.errors import InputError, Notice, UsageError, count_of, list_names, list_rows
 from truearm.files import as_path, name_in_text
-from truearm.kinds import required
+from truearm.kinds import count as whole_number
+from truearm.kinds import required, text
 from truearm.tables.columns import StatedUnits
 from truearm.tables.measured_fields import read_fields
 from truearm.tables.reading import read_csv_table, table_from_frame
@@ -192,7 +193,7 @@ class Measurements:
         stated = StatedUnits(length_unit, angle_unit, joints)
         file = as_path(path)
         read = cls._read(file, stated, group=file.stem)
-        read.require_joint_count(joint_count if joints is None else len(joints))
+        read.require_joint_count(joint_count if joints is None else stated.joint_count)
         return read
 
     @classmethod
@@ -214,7 +215,7 @@ class Measurements:
         read = cls(
             **read_fields(read_csv_table(file), stated, default_group=name_in_text(file.stem), measured=False)
         )
-        read.require_joint_count(None if joints is None else len(joints))
+        read.require_joint_count(stated.joint_count)
         return read
 
     @classmethod
@@ -250,7 +251,7 @@ class Measurements:
         stated = StatedUnits(length_unit, angle_unit, joints)
         parts = [cls._read(path, stated, group=name) for path, name in zip(files, names, strict=True)]
         for part in parts:
-            part.require_joint_count(None if joints is None else len(joints))
+            part.require_joint_count(stated.joint_count)
         return cls.concatenate(parts)
 
     @classmethod
@@ -283,8 +284,9 @@ class Measurements:
         if len(frame) == 0:
             raise InputError("there are no data rows", where=name)
         stated = StatedUnits(length_unit, angle_unit, joints)
-        read = cls(**read_fields(table_from_frame(frame, where=name), stated, default_group=name))
-        read.require_joint_count(None if joints is None else len(joints))
+        table = table_from_frame(frame, where=text(name, "name"))
+        read = cls(**read_fields(table, stated, default_group=name))
+        read.require_joint_count(stated.joint_count)
         return read
 
     @staticmethod
@@ -378,12 +380,12 @@ class Measurements:
 
     def require_joint_count(self, count: int | None) -> None:
         """Internal: raise InputError unless there are `count` joints; None asks for nothing."""
-        if count is not None and self.joint_count != count:
+        if count is not None and self.joint_count != whole_number(count, "joint_count"):
             zero = next((name for name in self.features if re.fullmatch("q0(_[a-z]+)?", str(name))), None)
             raise InputError(
                 f"there are {self.joint_count} joint columns",
                 where=", ".join(self.files),
-                rule=f"The robot has {count} joints",
+                rule=f"The robot has {count_of(count, 'joint')}",
                 way_out="Name the robot that was measured, of a URDF as FILE.urdf#BASE,TIP the links that "
                 "its joints are between, or correct the columns"
                 if zero is None

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import WorkError
+from truearm.errors import WorkError, count_of
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -41,6 +41,10 @@ class Carried:
     setup: Floats
     tied: Floats
 
+    def __repr__(self) -> str:
+        unknowns, shown = self.response.shape
+        return f"<Carried: {count_of(unknowns, 'unknown')}, {count_of(shown, 'value')} of rows>"
+
 
 @dataclass(frozen=True, eq=False)
 class Revision:
@@ -63,6 +67,10 @@ class Revision:
     digest: str
     file: bytes | None
     carried: Carried | None = None
+
+    def __repr__(self) -> str:
+        kept = "left out" if self.file is None else "kept"
+        return f"<Revision: {self.report['verdict']}, the calibration before is {kept}>"
 
     @classmethod
     def of(cls, report: Mapping[str, Any], directions: Floats, covariance: Floats, file: bytes) -> "Revision":

@@ -175,7 +175,7 @@ class Robot(RobotData):
     @classmethod
     def _from_chain(cls, chain: UrdfChain, where: str) -> "Robot":
         return cls(
-            name=chain.name,
+            name=chain.name or where,
             source=_source(chain, where),
             convention="standard",
             joints=chain.joints,

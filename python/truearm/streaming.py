@@ -12,6 +12,7 @@ from truearm.compensation import Compensator
 from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
 from truearm.errors import InputError, UsageError, list_names
 from truearm.kinds import check_number, check_values, settle
+from truearm.named_values import check_readings
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -150,6 +151,7 @@ class CorrectionStream:
         """
         check_number(elapsed_s, "elapsed_s")
         readings = None if q is None else as_numbers(q, what="the readings of a set-point")
+        check_readings(q, what="the readings of a set-point")
         if readings is not None and readings.shape != (self._joints,):
             raise InputError(
                 f"the readings of a set-point have shape {readings.shape}",

@@ -14,7 +14,7 @@ from truearm._core import Chain
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.protocols import Robot, Sensor
 from truearm.cell.run_up import RunUp
-from truearm.cell.schema import Positive, Quaternion, Section, Share, Vector3, checked
+from truearm.cell.schema import NotNegative, Positive, Quaternion, Section, Share, Vector3, checked
 from truearm.defaults import LINK_RADIUS_MM
 from truearm.errors import InputError
 from truearm.files import parsed, read_text
@@ -57,7 +57,7 @@ class TargetSection(Section):
 class ClearanceSection(Section):
     """Sizes that keep the arm's links and the table's arm apart, and where the floor is."""
 
-    link_radius_mm: Positive = LINK_RADIUS_MM
+    link_radius_mm: NotNegative = LINK_RADIUS_MM
     column_radius_mm: Positive = 15.0
     column_mm: Positive = 600.0
     margin_mm: Positive = 10.0
@@ -74,7 +74,7 @@ class ProcessSection(Section):
     contacts: Annotated[int, Field(ge=1, le=10)] = 2
     attempts: Annotated[int, Field(ge=1, le=50)] = 8
     recoveries: Annotated[int, Field(ge=0)] = 5
-    recovery_s: Annotated[float, Field(ge=0.0)] = 2.0
+    recovery_s: NotNegative = 2.0
     agree_mm: Positive = 0.4
     suspicious: Positive = 5.0
     expected_mm: Positive = 4.0
@@ -118,12 +118,12 @@ class SimulateSection(Section):
     seed: int = 0
     speed: Positive = 1.0
     arm: dict[str, Any] | None = None
-    frame_error_mm: Annotated[float, Field(ge=0.0)] = 4.0
-    frame_error_deg: Annotated[float, Field(ge=0.0)] = 0.3
-    table_mm: Annotated[float, Field(ge=0.0)] = 0.02
-    panel_mm: Annotated[float, Field(ge=0.0)] = 0.05
-    tracker_mm: Annotated[float, Field(ge=0.0)] = 0.02
-    servo_lag_s: Annotated[float, Field(ge=0.0)] = 0.05
+    frame_error_mm: NotNegative = 4.0
+    frame_error_deg: NotNegative = 0.3
+    table_mm: NotNegative = 0.02
+    panel_mm: NotNegative = 0.05
+    tracker_mm: NotNegative = 0.02
+    servo_lag_s: NotNegative = 0.05
     answer: str | None = None
     repeatable: bool = False
     faults: FaultsSection = FaultsSection()

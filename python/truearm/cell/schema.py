@@ -1,15 +1,18 @@
 """Checking a section of the cell file against its pydantic class, with errors that name key and rule."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from truearm.errors import InputError, did_you_mean
+from truearm.strictly import strictly
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Frame = Annotated[str, Field(pattern="^[78][NEO][12]$")]
 TcpPort = Annotated[int, Field(ge=1, le=65535)]
@@ -49,27 +52,43 @@ def checked(model: type[M], content: Mapping[str, Any], *, where: str) -> M:
         InputError: If a key is unknown or missing, or a value breaks its rule.
     """
     try:
-        return model.model_validate(content)
+        return strictly(model, content)
     except ValidationError as error:
         details = error.errors(include_url=False)
         unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
-        raise _in_words(model, (unknown or details)[0]).at(where) from None
+        raise _in_words(model, (unknown or details)[0], details).at(where) from None
 
 
-def _in_words(model: type[BaseModel], detail: ErrorDetails) -> InputError:
+def _in_words(model: type[BaseModel], detail: ErrorDetails, details: Sequence[ErrorDetails]) -> InputError:
     place = [str(part + 1) if isinstance(part, int) else part for part in detail["loc"]]
     key = ", ".join(place)
     if detail["type"] == "extra_forbidden":
         known = _known_keys(model, place[:-1])
         hint = did_you_mean(place[-1], known) or f"Known here: {', '.join(known)}"
         return InputError(f'unknown key "{key}"', rule=hint)
-    if detail["type"] == "missing":
+    if detail["type"] == "missing" and not isinstance(detail["loc"][-1], int):
         return InputError(f'key "{key}" is missing')
+    if detail["type"] == "literal_error":
+        known = re.findall("'([^']*)'", detail["ctx"]["expected"])
+        rule, way_out = f"Either {' or '.join(known)}", did_you_mean(str(detail["input"]), known)
+        return InputError(f'"{detail["input"]}" is not known', where=key, rule=rule, way_out=way_out)
     if detail["type"] == "value_error":
         return InputError(str(detail["ctx"]["error"]), where=key)
     shown = repr(detail["input"])
     value = f"{shown} cannot be used" if len(shown) < 60 else "the value cannot be used"
+    if detail["type"] in ("missing", "too_long"):
+        *place, _ = place if detail["type"] == "missing" else (*place, "")
+        rule = f"It must have {_length(detail, details)} values"
+        return InputError(value, where=", ".join(place), rule=rule)
     return InputError(value, where=key, rule=UNIT_RULES.get(detail["type"], detail["msg"]))
+
+
+def _length(detail: ErrorDetails, details: Sequence[ErrorDetails]) -> int:
+    """How many values a list that has too few or too many must have."""
+    if detail["type"] == "too_long":
+        return int(detail["ctx"]["max_length"])
+    missing = [other for other in details if other["loc"][:-1] == detail["loc"][:-1]]
+    return len(detail["input"]) + len(missing)
 
 
 def _known_keys(model: type[BaseModel], place: list[str]) -> list[str]:

@@ -46,6 +46,8 @@ class RobotData:
     urdf_names: UrdfNames | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"{self.name!r}", where="name", rule="The name is a text that is not empty")
         n = len(self.joints)
         _check_known("convention", (self.convention,), get_args(Convention))
         _check_known("joints", self.joints, get_args(Joint))

@@ -7,7 +7,15 @@ from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import ErrorDetails
 
 from truearm.errors import InputError, did_you_mean, list_names
@@ -21,6 +29,16 @@ Name = Annotated[str, Field(min_length=1)]
 Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 ROW_KEYS: Final = ("theta", "d", "a", "alpha", "beta")
+
+
+def _no_flag(value: object) -> object:
+    """What is neither true nor false, which Python takes for 1 and 0."""
+    if isinstance(value, bool):
+        raise ValueError(f"{str(value).lower()} is no direction; it must be 1 or -1")  # noqa: TRY004 - pydantic's
+    return value
+
+
+Direction = Annotated[Literal[1, -1], BeforeValidator(_no_flag)]
 
 
 class _Section(BaseModel):
@@ -72,7 +90,7 @@ class Link(Row):
     """One joint and the row of the table behind it."""
 
     joint: Literal["revolute", "prismatic"]
-    direction: Literal[1, -1] = 1
+    direction: Direction = 1
     limits: Annotated[list[Limit], Field(min_length=2, max_length=2)] | None = None
 
     @field_validator("limits")

@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers
 from truearm.description.robot_data import Joint
+from truearm.description.robot_file import ROW_KEYS
 from truearm.errors import InputError, count_of
+from truearm.named_values import check_row
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +49,7 @@ def table_fields(
 def _rows(table: ArrayLike) -> Floats:
     """A table (N, 5) of one that may be without beta."""
     rows = as_numbers(table, what="values of table")
+    check_row(table, ROW_KEYS, what="the table")
     if rows.ndim != 2 or rows.shape[1] not in {WITHOUT_BETA, WITH_BETA} or len(rows) == 0:
         raise InputError(
             f"shape {rows.shape}",

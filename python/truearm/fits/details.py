@@ -34,7 +34,7 @@ class ConstantDetails:
     """
 
     names: tuple[str, ...]
-    covariance: Floats
+    covariance: Floats = field(repr=False)
     standard_errors: Floats
     noise_m: float
     noise_rad: float

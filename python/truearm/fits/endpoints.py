@@ -1,6 +1,7 @@
 """The point or frame that a prediction is of: the robot's tool, another tool, or a measured target."""
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, check_finite, rigid
 from truearm.errors import InputError, UsageError, WorkError, did_you_mean, list_names
+from truearm.kinds import check_number
 from truearm.robot import Robot
 from truearm.rotations import rigid_motion
 
@@ -106,6 +108,8 @@ def at_target(
         return Endpoint(at_tool(calibration.robot, tool), world_from_base)
     known = [k + 1 for k in selection.targets] or [1]
     held = calibration.measured.targets[number]
+    if target is not None:
+        check_number(target, "target", Integral)
     wanted = known[calibration.measured.first(number)] if target is None else target
     if wanted not in known:
         raise UsageError(f"there is no target {wanted}", rule=f"Targets {known} were fitted")

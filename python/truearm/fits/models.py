@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Field, Setup
 from truearm.arrays import hold_read_only
+from truearm.errors import UsageError
 from truearm.fits.schemes import Scheme, add_ceps
 
 Floats = NDArray[np.float64]
@@ -40,6 +41,19 @@ class ArmModel:
 
     def __post_init__(self) -> None:
         hold_read_only(self, "constants")
+
+    def __copy__(self) -> "ArmModel":
+        return self
+
+    def __deepcopy__(self, _: object) -> "ArmModel":
+        return self
+
+    def __reduce__(self) -> tuple[object, ...]:
+        raise UsageError(
+            "a model of an arm is not pickled alone",
+            rule="What varies in it needs the arm, which the calibration has",
+            way_out="Send the calibration, and take calibration.models from that",
+        )
 
     def parameters(self, inputs: Floats) -> Floats:
         """Absolute parameters at inputs (n, I), joint values and features: (n, L, 5)."""

@@ -1,19 +1,23 @@
 """The fleet file: which arms there are, where their data is, how to calibrate them, what needs attention."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 from pydantic import BeforeValidator, Field
+from pydantic.fields import FieldInfo
 
 from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed, read_text
 from truearm.fits.core_set import DISTANCE
-from truearm.fits.options import Options
+from truearm.fits.options import CHOICES, Options
+from truearm.fits.scheme_options import KNOWN
 from truearm.fleet.keys import in_keys
+from truearm.rows.splitting import RANGE_FORM
+from truearm.units import AngleUnit, LengthUnit
 
 ARM_NAME: Final = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 PLACEHOLDER: Final = "{arm}"
@@ -34,38 +38,53 @@ Number = Annotated[float, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
 
 
+def _told(rule: Mapping[str, Any]) -> FieldInfo:
+    """What the schema tells of a key whose value Options checks."""
+    return cast("FieldInfo", Field(json_schema_extra=dict(rule)))
+
+
+def _one_of(choices: Sequence[object]) -> FieldInfo:
+    return _told({"enum": [choice for choice in choices if choice is not None]})
+
+
+BETWEEN_0_AND_1: Final = _told({"exclusiveMinimum": 0, "exclusiveMaximum": 1})
+FROM_ZERO: Final = _told({"minimum": 0})
+FROM_ONE: Final = _told({"minimum": 1})
+ABOVE_ZERO: Final = _told({"exclusiveMinimum": 0})
+
+
 class DefaultsSection(Section):
     """What holds for all arms that say nothing else; options as of `truearm calibrate`."""
 
     robot: Text | None = None
     measurements: Files | None = None
     previous: Text | None = None
-    length_unit: str | None = None
-    angle_unit: str | None = None
+    length_unit: LengthUnit | None = None
+    angle_unit: AngleUnit | None = None
     strip: bool = False
     report: bool = True
-    holdout: Number | None = None
-    seed: Whole | None = None
-    train_size: Whole | None = None
+    holdout: Annotated[Number | None, BETWEEN_0_AND_1] = None
+    seed: Annotated[Whole | None, FROM_ZERO] = None
+    train_size: Annotated[Whole | None, FROM_ONE] = None
     split_by: list[Text] | None = None
-    holdout_range: str | None = None
-    use: str | None = None
-    judge_target: Whole | None = None
-    model: str | None = None
-    robust: str | None = None
-    drift: str | None = None
+    holdout_range: Annotated[str | None, _told({"pattern": f"^{RANGE_FORM.pattern}$"})] = None
+    use: Annotated[str | None, _one_of(CHOICES["use"])] = None
+    judge_target: Annotated[Whole | None, FROM_ONE] = None
+    model: Annotated[str | None, _one_of(CHOICES["model"])] = None
+    robust: Annotated[str | None, _one_of(CHOICES["robust"])] = None
+    drift: Annotated[str | None, _one_of(CHOICES["drift"])] = None
     features: list[Text] | None = None
-    frame: str | None = None
+    frame: Annotated[str | None, _one_of(CHOICES["frame"])] = None
     refit: bool | None = None
     scheme_joints: list[Whole] | None = None
-    demanded_mm: Number | None = None
-    most_regions: Whole | None = None
-    region_rows: Whole | None = None
-    region_ceps: str | None = None
-    train_on: str | None = None
-    membership: str | None = None
-    composition: str | None = None
-    repeatability_mm: Number | None = None
+    demanded_mm: Annotated[Number | None, FROM_ZERO] = None
+    most_regions: Annotated[Whole | None, FROM_ONE] = None
+    region_rows: Annotated[Whole | None, FROM_ONE] = None
+    region_ceps: Annotated[str | None, _one_of(KNOWN["region_ceps"])] = None
+    train_on: Annotated[str | None, _one_of(KNOWN["train_on"])] = None
+    membership: Annotated[str | None, _one_of(KNOWN["membership"])] = None
+    composition: Annotated[str | None, _one_of(KNOWN["composition"])] = None
+    repeatability_mm: Annotated[Number | None, ABOVE_ZERO] = None
 
 
 class ArmSection(DefaultsSection):

@@ -34,6 +34,8 @@ COLUMNS: Final = (
 LEFT: Final = (0, 1, 2, 4, 10)
 MARKS: Final = (("nominal", "nominal", "nominal_mean_mm"), ("variable", "calibrated", "mean_mm"))
 """Models, what they are called, and their errors in rows."""
+OPEN: Final = "-open"
+"""How symbols that are not filled end."""
 SMALLEST: Final = 1e-4
 """In mm: smaller errors are drawn there."""
 AROUND: Final = 1.3
@@ -178,10 +180,15 @@ def _mean_errors(of: str, arms: Sequence[Judged], mark: tuple[str, str, str]) ->
         "y": [max(float(arm.row[key]), SMALLEST) for arm in arms],
         "marker": {
             "color": f"@{model}",
-            "symbol": marker_of(model) + ("-open" if of == DISTANCE else ""),
+            "symbol": _other_filling(marker_of(model)) if of == DISTANCE else marker_of(model),
             "size": 10,
         },
     }
+
+
+def _other_filling(symbol: str) -> str:
+    """The symbol of the same form, open where it is filled, and filled where it is open."""
+    return symbol.removesuffix(OPEN) if symbol.endswith(OPEN) else symbol + OPEN
 
 
 def _drift(arms: Sequence[Judged]) -> Figure | None:

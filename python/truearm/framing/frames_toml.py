@@ -18,6 +18,7 @@ from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.programs.environment import Frame
 from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, WORLDS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
+from truearm.strictly import strictly
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -46,7 +47,7 @@ def former_entry(path: str | Path, kind: str, name: str) -> tuple[FrameEntry, fl
     if key is None:
         return None
     unit = LENGTHS_M[content.get("length_unit", "mm")]
-    return FrameEntry.model_validate(content[kind][key]), unit
+    return strictly(FrameEntry, content[kind][key]), unit
 
 
 def tip_covariance(entry: FrameEntry) -> Floats | None:

@@ -8,6 +8,7 @@ from typing import Any
 from truearm.compensation import Compensator
 from truearm.controller import Controller
 from truearm.errors import UsageError
+from truearm.files import existing
 from truearm.inverse import Inverse
 from truearm.kinds import required
 from truearm.programs.declaring import declared_controller, refuse_another_arm, refuse_contradiction
@@ -63,13 +64,13 @@ def compensate_program(
     chosen = required(choices or Choices(), Choices, "the choices")
     compensator = required(compensator, Compensator, "the compensator")
     calibration, author = compensator.calibration, compensator.programming
-    written_in = language_of(Path(path), chosen.language)
+    written_in = language_of(file := existing(path), chosen.language)
     declared = _declared(controller, written_in, calibration.robot)
     refuse_another_arm(declared, calibration.robot)
     known = _frames(frames).fresh()
     # Configuration data tells of the catalogue's postures; poses are of the tool that the author had.
     postured = replace(calibration.robot, tool=author.tool)
-    program = read_program(Path(path), written_in, postured, known)
+    program = read_program(file, written_in, postured, known)
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
     beyond = tuple(beyond_learnt(calibration, compensator.features))

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.named_values import JOINT
 from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
@@ -24,7 +25,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.robot import Robot
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
-from truearm.tables.columns import JOINT, QUATERNION, TARGET
+from truearm.tables.columns import QUATERNION, TARGET
 from truearm.tables.reading import DELIMITERS
 from truearm.units import to_si
 

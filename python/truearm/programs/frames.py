@@ -21,6 +21,7 @@ from truearm.rotations import (
     matrix_from_rotation_vector,
     transform_from_parts,
 )
+from truearm.strictly import strictly
 
 Kind = Literal["tool", "object"]
 Written = TypeVar("Written", bound=Hashable)
@@ -153,7 +154,7 @@ class Frames:
     def parse(cls, text: str, *, where: str = "frames") -> "Frames":
         """The frames of the text of a file."""
         try:
-            content = FramesFile.model_validate(parsed(text, where=where))
+            content = strictly(FramesFile, parsed(text, where=where))
         except ValidationError as error:
             first = error.errors()[0]
             key = ".".join(str(part) for part in first["loc"])

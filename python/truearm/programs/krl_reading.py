@@ -16,6 +16,7 @@ from truearm.programs.gathered import Gathered
 from truearm.programs.krl_order import Order, Place
 from truearm.programs.krl_routines import (
     BAS_LEAVING,
+    DOING_LATER,
     EXTERNAL,
     LEAVING,
     SETTING,
@@ -24,6 +25,7 @@ from truearm.programs.krl_routines import (
     bas_command,
     called,
     immediate,
+    set_later,
 )
 from truearm.programs.krl_state import (
     CALLED,
@@ -163,7 +165,7 @@ class KrlReading:
         word = reader.peek()
         if reader.done or word in EXTERNAL or DECLARED.match(source.text, start, end):
             return
-        if "(" in head:
+        if "(" in head or word in DOING_LATER:
             self._calls_of(reader.rest())
         if word in MOTIONS and reader.peek(1) not in {"=", "(", "[", "."}:
             at = reader.take().start
@@ -212,6 +214,7 @@ class KrlReading:
                 call = Call(None, self._flow.state.lost(INTERRUPTED), self._order.here())
                 self._calls.setdefault(name, []).append(call)
             self._interrupting |= not self._routines.leaves(name)
+        self._interrupting |= set_later(later)
         if later and found[0].text.lower() != "trigger":
             self._after_interrupts()
 

@@ -39,6 +39,8 @@ LEAVING: Final = COMPUTING | _words(
 """Routines of KUKA that change neither tool nor base and do not move the arm; BAS is read for itself."""
 BAS_LEAVING: Final = frozenset({"acc_cp", "acc_ptp", "acc_glue", "cp_dat", "ptp_dat", "vel_cp", "vel_ptp"})
 """Commands of BAS that set neither tool nor base."""
+DOING_LATER: Final = frozenset({"trigger", "interrupt", "global"})
+"""First words of statements that say what an interrupt or a trigger does."""
 SETTING: Final = frozenset({"$tool", "$base", "$ipo_mode", "$load", "fdat_act"})
 
 
@@ -78,6 +80,11 @@ def immediate(found: list[Token]) -> tuple[list[Token], list[Token]]:
         (place for place, token in enumerate(found) if starts and token.text.lower() == "do"), len(found)
     )
     return found[:at], found[at:]
+
+
+def set_later(later: Sequence[Token]) -> bool:
+    """Whether what an interrupt or a trigger does is to set what stays until it is changed."""
+    return len(later) > 1 and later[1].text.lower() in SETTING
 
 
 def bas_command(words: Sequence[str]) -> tuple[str, str]:
@@ -190,6 +197,7 @@ class Routines:
         if words[0] == "bas" and bas_command(words)[0] not in BAS_LEAVING:
             return True
         assigned = ASSIGNING.match(source.text, start, end) is not None and words[0] in SETTING
+        assigned |= set_later(immediate(found)[1])
         return assigned or not all(self.leaves(name) for name in called(found))
 
 

@@ -20,6 +20,10 @@ HEADER: Final = re.compile(
 )
 DECLARING: Final = re.compile(r"[ \t]*(?:(?:decl|global|const)[ \t]+)+(\w+[ \t]+)?", re.IGNORECASE)
 ASSIGNING: Final = re.compile(r"[ \t]*[A-Za-z_$][\w$]*(?:[ \t]*\[[^\]\r\n]*\])?(?:\.\w+)*[ \t]*=(?!=)")
+LATER: Final = re.compile(
+    r"[ \t]*(?:global[ \t]+)?(?:trigger|interrupt)[ \t][^;\r\n]*?(?<![\w$])do[ \t]+", re.IGNORECASE
+)
+"""Where what an interrupt or a trigger does at some time begins."""
 TARGET_KINDS: Final = frozenset({"pos", "e6pos", "axis", "e6axis"})
 PREPARED: Final = frozenset({"fdat_act", "pdat_act", "ldat_act", "$h_pos"})
 """What is assigned as it is, without computing with it."""
@@ -80,6 +84,10 @@ class KrlStorage:
             if begins is not None:
                 reader = line_reader(source, begins.end(), end)
                 self._declared(file, begins.group(1).lower(), reader)
+                continue
+            later = LATER.match(source.text, start, end)
+            if later is not None and ASSIGNING.match(source.text, later.end(), end):
+                self._assigned_later(file, line_reader(source, later.end(), end))
                 continue
             declaring = DECLARING.match(source.text, start, end)
             first = start if declaring is None else declaring.end()
@@ -148,6 +156,14 @@ class KrlStorage:
             return
         self.values.setdefault(variable.key, []).append((file, None))
         self.read |= names_in(reader.rest())
+
+    def _assigned_later(self, file: int, reader: Reader) -> None:
+        """What an interrupt or a trigger assigns: nobody knows when."""
+        variable = named(reader)
+        if variable is not None:
+            self._note(variable, reader)
+            self.values.setdefault(variable.key, []).append((file, None))
+            self.read |= names_in(reader.rest())
 
     def _note(self, variable: Named, reader: Reader) -> None:
         if variable.several:

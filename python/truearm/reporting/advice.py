@@ -322,6 +322,15 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
         yield Advice("no_orientation", "Measure orientation.", words, weight)
 
 
+def _along_distances(facts: Facts) -> Iterator[Advice]:
+    if facts.calibration.selection.distances:
+        words = (
+            "These errors are of distances, one coordinate of where the point is; those of positions are "
+            "larger. Distances to further fixed points, in other directions, tell more of them."
+        )
+        yield Advice("further_points", "Measure to further fixed points.", words, 0.05 * facts.mean_mm())
+
+
 def _few_held(facts: Facts) -> Iterator[Advice]:
     words = facts.calibration.validation.few
     if words and facts.update is not None:
@@ -382,6 +391,7 @@ RULES: Final = (
     _noise_or_poses,
     _tail,
     _unseen,
+    _along_distances,
     _few_held,
     _intervals,
     _what_varies,

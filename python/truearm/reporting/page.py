@@ -1,8 +1,10 @@
 """A self-contained page: one HTML file with its figures, its style and the plotting script."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
+from html import escape
 from typing import Any, Final
 
 from truearm.reporting.parts import Figure, Head, Part, Section
@@ -10,6 +12,7 @@ from truearm.reporting.script import licence_notice, plotting_script
 from truearm.reporting.style import DARK, LAYOUT, LIGHT
 
 TEMPLATE: Final = "page.html.jinja"
+OPTION: Final = re.compile(r"(?<![\w-])--[a-z][a-z-]*[a-z]")
 
 
 def page(head: Head, sections: Sequence[Section], *, foot: str = "") -> str:
@@ -29,6 +32,7 @@ def page(head: Head, sections: Sequence[Section], *, foot: str = "") -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["whole_options"] = _whole_options
     shown = [section for section in sections if section.parts]
     numbered, figures = _number_figures(shown)
     content = {"palettes": {"light": LIGHT, "dark": DARK}, "layout": LAYOUT, "figures": figures}
@@ -40,6 +44,11 @@ def page(head: Head, sections: Sequence[Section], *, foot: str = "") -> str:
         plotly=plotting_script() if figures else "",
         licence=licence_notice() if figures else "",
     )
+
+
+def _whole_options(words: str) -> str:
+    """HTML of words in which no line ends within the name of an option, as it may behind any hyphen."""
+    return OPTION.sub(r"<code>\g<0></code>", escape(words))
 
 
 def _number_figures(sections: Sequence[Section]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:

@@ -8,9 +8,9 @@ from typing import Final, TypeVar, get_args
 from truearm.description.robot_data import Joint
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.kinds import check_choice, words
+from truearm.named_values import JOINT
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
-JOINT: Final = re.compile(r"q([1-9]\d*)(?:_(rad|deg|m|mm))?")
 TARGET: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
 SIGMA: Final = re.compile(r"sigma(?:_(m|mm))?")
 DISTANCE: Final = re.compile(r"distance(?:_(m|mm))?")
@@ -85,8 +85,15 @@ class StatedUnits:
         for value, known in ((self.length, LENGTH_UNITS), (self.angle, ANGLE_UNITS)):
             if value is not None and value not in known:
                 raise UsageError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
-        for kind in () if self.joints is None else words(self.joints, "joints"):
+        if self.joints is not None:
+            object.__setattr__(self, "joints", words(self.joints, "joints"))
+        for kind in self.joints or ():
             check_choice(kind, "joints", get_args(Joint))
+
+    @property
+    def joint_count(self) -> int | None:
+        """How many joints there are; None where nothing says."""
+        return None if self.joints is None else len(self.joints)
 
 
 def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str, measured: bool = True) -> Layout:
