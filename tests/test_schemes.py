@@ -42,12 +42,6 @@ def test_schemes_beat_the_constants_where_errors_vary(calibrations, model):
     assert held_out[model].position.mean < 0.8 * held_out["constant"].position.mean
 
 
-def test_regions_are_halved_breadth_first(calibrations):
-    """Decision 0010: halving the worst region first chases noise."""
-    regions = calibrations["regions"].model.scheme.regions
-    assert np.ptp(regions.depths[regions.leaves]) <= 1
-
-
 def test_what_a_scheme_leaves_is_its_own(calibrations, data, arm):
     found = calibrations["regions"]
     unexplained = found.summary["noise_mm"]

@@ -163,9 +163,6 @@ def test_figures_of_the_first_seed_are_told_as_they_are_made(monkeypatch):
 
     run([0], ("6", "cmac"), stages)
     assert told == ["figure 1 of 2", "figure 2 of 2"]
-    told.clear()
-    run([0, 1], ("6",), stages, workers=1)
-    assert told == ["seed 1 of 2", "figure 1 of 1", "seed 2 of 2"]
 
 
 def test_unknown_figures_and_no_seeds_are_refused(tmp_path, capsys):

@@ -156,7 +156,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
         "accuracy": options.demanded_mm / MM_PER_METRE,
         "regions": options.most_regions,
         "halving": options.halving,
-        "order": "breadth",
+        "order": "worst",
         "poses": options.region_rows,
         "limit": CONDITION_OF_WHOLE * observability(jacobian, list(rows.columns))["kappa"],
         "seed": rows.seed,
