@@ -327,7 +327,9 @@ def no_help(
         return []
     if nothing_to_gain(before_mm, after_mm, floor_mm):
         start, why = "There is nothing to gain", AS_THE_TABLE
-        if before_mm >= NEAR_MM and not leaves_noise(best):
+        if outliers.named and outliers.fate == FULL_WEIGHT:
+            start, why = "The calibration gains nothing", _these_first(outliers)
+        elif before_mm >= NEAR_MM and not leaves_noise(best):
             start, why = gains_nothing(best)
         elif before_mm >= NEAR_MM:
             why = (
@@ -338,7 +340,7 @@ def no_help(
             f"{start}: the {what}{outliers.without} is {length_mm(after_mm, 4)}, that of the nominal "
             f"model {length_mm(before_mm, 4)} already. {why}"
         )
-        if outliers.means_mm:
+        if outliers.means_mm and outliers.fate != FULL_WEIGHT:
             text += f" Correct the rows that are far off, or leave them out: {outliers.judged}."
         return [Notice(NO_GAIN, text)]
     text = (

@@ -45,7 +45,7 @@ class Outliers:
         if rows is None:
             return NO_OUTLIERS
         found = rows.outliers()
-        held = None if calibration.selection.distances else calibration.held
+        held = calibration.held
         means = {} if held is None else held.means_without_mm(found)
         turns = {} if held is None else held.turns_without_mrad(found)
         judged = held.among(found, calibration.model_name) if held is not None and means else []
