@@ -1,5 +1,7 @@
 """Distances that are far off are named, though constants that keep them follow them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ def measured(off_m, *, paired=False, poses=POSES):
     table = ARM.measure_table(ARM.poses(poses))
     points = table[["x", "y", "z"]].to_numpy()
     joints = table[[f"q{k}" for k in range(1, 7)]]
+    where: dict[str, Any]
     if paired:
         away = np.linalg.norm(points[::2] - points[1::2], axis=1)
         where = {"pair": [f"p{k // 2}" for k in range(poses)]}
@@ -58,6 +61,7 @@ def test_errors_are_told_without_distances_that_are_far_off(tmp_path):
     found = calibrated(measured({int(HELD[2]): 0.05}), robust="cauchy")
     found.save(tmp_path / "arm.calib")
     again = ta.Calibration.load(tmp_path / "arm.calib")
+    assert again.rows is not None
     assert again.rows.outliers() == found.rows.outliers()
     outliers = Outliers.of(again)
     assert outliers.judged.startswith(f"row {HELD[2] + 1} (49.9")

@@ -26,6 +26,7 @@ def test_a_robust_loss_does_not_make_an_update_compare_with_a_median():
         told = ta.update(again, measured(arm, 15, 2))
         left[robust] = told.rest.squares / told.rest.freedom, found.constant
     (squares, plain), (robustly, median) = left.values()
+    assert median.scale is not None
     assert robustly < 1.2 * squares
     assert median.noise_m < 0.7 * plain.noise_m
     assert median.noise_m * median.scale.widened == pytest.approx(plain.noise_m, rel=0.35)
