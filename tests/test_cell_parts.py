@@ -172,7 +172,7 @@ def test_what_is_accepted_agrees_and_outnumbers_what_contradicts(points):
     if verdict.decision == "accept":
         chosen = [points[attempt - 1] for attempt in verdict.attempts]
         assert len(chosen) > len(points) - len(chosen)
-        assert max(chosen) - min(chosen) <= 2 * 0.4 + 1e-9
+        assert max(chosen) - min(chosen) <= 0.4 + 1e-9
 
 
 def test_stretches_grow():

@@ -11,7 +11,7 @@ from truearm.cell.cell_file import ProcessSection
 from truearm.cell.judge import Rules, judge
 from truearm.cell.measuring import DONE
 from truearm.cell.playback import PlaybackSensor
-from truearm.cell.scatter import AS_RARE_AS, explained_m, sigma_of_mean_m, told_coarse
+from truearm.cell.scatter import AS_RARE_AS, explained_m, sigma_of_mean_m, told_coarse, weighted_mean
 from truearm.cell.session import Stored
 from truearm.cell.summary import summary_of
 from truearm.cli import main
@@ -24,7 +24,9 @@ SIGMA_M = 0.35e-3
 def test_what_is_explained_is_as_rare_as_a_normal_value_so_far_off():
     assert chdtrc(3, explained_m(1.0, 0.0) ** 2) == pytest.approx(2.0 * ndtr(-AS_RARE_AS))
     assert explained_m(3.0, 4.0) == pytest.approx(5.0 * explained_m(1.0, 0.0))
-    assert sigma_of_mean_m([2.0, 4.0, 3.0, 3.0]) == pytest.approx(1.5)
+    assert sigma_of_mean_m([3.0] * 4) == pytest.approx(1.5)
+    assert sigma_of_mean_m([3.0, 4.0]) == pytest.approx(2.4)
+    assert weighted_mean([[0.0], [25.0]], [3.0, 4.0]) == pytest.approx([9.0])
 
 
 def test_limits_of_the_example_with_a_panel_hold_as_they_are_stated():
@@ -39,6 +41,27 @@ def test_readings_agree_as_well_as_their_standard_deviations_say(sigma_m, decisi
     readings = [Stored(k, True, (1e-3 * k, 0.0, 0.0), sigma_m) for k in (1, 2)]
     rules = Rules(contacts=2, attempts=6, agree_m=0.4e-3, likely_m=4e-3)
     assert judge(readings, np.zeros(3), rules).decision == decision
+
+
+FINE_M, COARSE_M = 2e-5, 1e-3
+RULES = Rules(contacts=2, attempts=8, agree_m=0.4e-3, likely_m=4e-3)
+
+
+def stated(*readings):
+    """Readings at (x, sigma), m."""
+    return [Stored(k, True, (x_m, 0.0, 0.0), sigma_m) for k, (x_m, sigma_m) in enumerate(readings, start=1)]
+
+
+def test_a_coarse_reading_does_not_make_others_agree_that_contradict():
+    between = stated((0.0, FINE_M), (5e-3, FINE_M), (2.5e-3, COARSE_M))
+    assert judge(between, np.zeros(3), RULES).decision == "again"
+    assert judge([*between, *stated((1e-5, FINE_M))], np.zeros(3), RULES).decision == "accept"
+
+
+def test_a_coarse_reading_moves_the_mean_by_what_it_tells():
+    found = judge(stated((0.0, FINE_M), (3e-3, COARSE_M)), np.zeros(3), RULES)
+    assert found.attempts == (1, 2)
+    assert found.off_m == pytest.approx(3e-3 * (FINE_M / COARSE_M) ** 2, rel=1e-3)
 
 
 @pytest.fixture

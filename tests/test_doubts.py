@@ -1,6 +1,7 @@
 """What cannot be true is said: rows that do not belong together, other robots, too few rows, wrong types."""
 
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import truearm as ta
 from tests.report_support import words_of
 from truearm.cli import main
 from truearm.doubts.grids import grid_steps, grid_words
-from truearm.doubts.of_results import no_help, poses_aside
+from truearm.doubts.of_results import SIGMA_FIRST, no_help, poses_aside
 from truearm.fits.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
 from truearm.reporting.report import report
@@ -334,6 +335,23 @@ def test_a_sigma_that_is_too_large_is_told(column, stated, told):
     words = words_of(report(calibration).html)
     assert ("Correct the column of sigma" in words) == bool(told)
     assert not (told and "noise floor is reached" in words)
+
+
+def test_a_sigma_in_another_unit_is_the_first_that_is_told_and_no_convention_is_tried():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    stages, table = [], arm.measure_table(arm.poses(60)).assign(sigma=0.03)
+
+    def counting(name):
+        stages.append(name)
+        return nullcontext()
+
+    data = ta.Measurements.from_dataframe(table)
+    calibration = ta.calibrate(arm.robot, data, model="constant", stages=counting)
+    kinds = [notice.kind for notice in calibration.notices]
+    assert kinds == ["stated_too_large", "no_help"]
+    assert notice_of(calibration, "no_help").endswith(SIGMA_FIRST)
+    assert "trying other conventions" not in stages
+    assert "the convention" not in words_of(report(calibration).html)
 
 
 @pytest.mark.parametrize("honest", [False, True])

@@ -80,3 +80,12 @@ def test_an_error_is_worse_than_one_of_its_kind_alone(was, kinds):
     drift = {**DRIFT, "previous_mean_mm": 0.04, "previous_errors_of": was}
     row = {**ROW, "drift": drift}
     assert [reason.kind for reason in reasons(row, [row], LimitsSection())] == kinds
+
+
+def test_an_arm_that_gains_nothing_names_its_outliers():
+    far = {"outliers": 1, "outliers_named": "row 21 (8.03 mm)"}
+    row = {**WIRE, "nominal_mean_mm": 0.23, "mean_mm": 0.23, **far}
+    words = [reason.words for reason in reasons(row, [row], LimitsSection()) if reason.kind == "no_gain"]
+    assert len(words) == 1
+    assert words[0].startswith("The calibration gains nothing: ")
+    assert words[0].endswith(" Look at its outliers first: row 21 (8.03 mm).")

@@ -8,7 +8,8 @@ import pytest
 
 import truearm as ta
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
-from truearm.doubts.whitened import Whitened
+from truearm.doubts.row_order import FEWEST_VISITS
+from truearm.doubts.whitened import MOST_VALUES, Whitened
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -107,3 +108,19 @@ def test_what_columns_do_is_found_with_its_size():
     chance, found = seen.explained(columns)
     assert chance < 1e-20
     assert found == pytest.approx(by, abs=0.05)
+
+
+def test_of_many_targets_on_a_tool_enough_visits_are_looked_at():
+    plain = Imperfections(share=0.0, noise_mm=0.02)
+    several = VirtualArm(ta.Robot.load("ur10"), seed=4, imperfections=plain)
+    readings, measured = several.poses(40), []
+    for seed, target in enumerate(np.random.default_rng(2).uniform(-0.1, 0.1, (14, 3))):
+        several.target_in_flange = target
+        measured.append(several.measure(readings, seed=seed))
+    data = replace(measured[0], targets=np.concatenate([each.targets for each in measured], axis=1))
+    found = ta.calibrate(several.robot, data, model="constant")
+    assert found.rows is not None
+    seen = Whitened.of(found, found.rows, np.linspace(0.0, 1.0, 40))
+    assert len(seen.rows) >= FEWEST_VISITS
+    assert seen.left.size <= MOST_VALUES
+    assert np.square(seen.left).sum() == pytest.approx(seen.freedom, rel=0.1)

@@ -13,7 +13,7 @@ from tests.test_programs_rapid import numbers
 from truearm.inverse import Inverse
 from truearm.programs.configuration import NearestTurns
 from truearm.programs.densify import ELSEWHERE, Spacing
-from truearm.programs.following import UNFOLLOWED, Follower, Line, Way
+from truearm.programs.following import UNFOLLOWED, Arrived, Follower, Line, Way
 from truearm.programs.solving import CONTRADICTS
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
@@ -172,6 +172,7 @@ def test_an_arc_keeps_the_posture_where_its_wrist_turns_by_less_than_half_a_turn
     branches = inverse.solutions(place)
     turned = NearestTurns(ABB)(branches, before)
     found = Follower(ABB, inverse).arrived(before, Way(np.eye(4), place, arc=True), branches, turned)
+    assert isinstance(found, Arrived)
     assert np.abs(found.q - after).max() < 1e-6
 
 
@@ -180,6 +181,7 @@ def test_the_wrist_is_followed_from_step_to_step_where_it_turns_fast():
     line = Line(pose(ABB, before), pose(ABB, after))
     follower, shares = Follower(ABB, Inverse(ABB)), np.linspace(0.0, 1.0, 4)
     found = follower.along(line, np.eye(4), shares, before, flipped(after))
+    assert found is not None
     assert np.abs(found[0] - before).max() < 1e-6
     assert np.abs(found[-1] - after).max() < 1e-6
     assert np.abs(ABB.pose(found) - line.poses(shares)).max() < 1e-6

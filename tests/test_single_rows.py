@@ -100,7 +100,10 @@ def test_a_set_up_that_moved_is_told_with_the_arm_that_changed_as_well(spoilt):
     both = ta.Measurements.from_dataframe(later(arm, SHIFT_DEG, elsewhere=True))
     found = ta.evaluate(calibration, both, keep_frames=True)
     assert kinds(found) == ["setup_moved", "not_as_calibrated"]
-    assert told(found, "setup_moved").endswith("elsewhere than then. Leave --keep-frames out.")
+    assert told(found, "setup_moved").endswith(
+        "elsewhere than then, or a joint does. If nobody moved these, truearm update --keep-frame "
+        "--keep-tool tells which joint it is. Otherwise leave --keep-frames out."
+    )
     assert "found anew: the arm, its tool or the set-up" in told(found, "not_as_calibrated")
     alone = ta.Measurements.from_dataframe(later(arm, STILL, elsewhere=True))
     (notice,) = ta.evaluate(calibration, alone, keep_frames=True).notices

@@ -13,6 +13,7 @@ from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import constant_details
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.doubts.admitted import admitted
+from truearm.doubts.gross_distances import distances_judged
 from truearm.doubts.of_calibration import of_fit, of_result, of_split
 from truearm.doubts.of_results import orientations_left_out, seen_at_values, stood_still
 from truearm.doubts.row_order import order_notices
@@ -20,7 +21,7 @@ from truearm.doubts.turning_sense import check_turns
 from truearm.doubts.unexplained import unexplained
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
-from truearm.fits.core_set import select
+from truearm.fits.core_set import distance_ends, select
 from truearm.fits.details import ConstantDetails, VariableDetails, left_m
 from truearm.fits.fitted_rows import FittedRows, sides
 from truearm.fits.fitting import (
@@ -204,7 +205,11 @@ def _validate(
         coverage_95=interval_coverage(task, trained, held),
         drift=drift_details(task, trained, drift, (data, split.holdout, errors)),
     )
-    return validation, HeldRows.of(held, errors)
+    by_row = errors
+    if task.selection.distances:
+        ends = distance_ends(held)[:, 0]
+        by_row = {name: found.at_rows(ends, len(held)) for name, found in errors.items()}
+    return validation, HeldRows.of(held, by_row)
 
 
 def _planned(judged: Measurements) -> int:
@@ -218,6 +223,8 @@ def _fitted_rows(
     """The rows of the last fit as they were measured; `given` are all rows, which of them, and the split."""
     data, order, split = given
     rows = FittedRows.of(final, sides(len(data), split)[order], task.selection)
+    if task.selection.distances:
+        rows = distances_judged(task, rows, final)
     if not drift:
         return rows
     return replace(rows, data=data.select(order), moved=drift.moved[order], progress=drift.progress[order])

@@ -64,7 +64,8 @@ Mask = NDArray[np.bool_]
 
 ELSEWHERE: Final = 0.1
 """Share of the error that is left with frame and tool found anew where these are elsewhere, whatever else is
-not as it was: of what a joint that moved does they take up less than half, or, of the first and last, all."""
+not as it was. They take up as much of what a joint does that moved where the rows are of a small part of the
+space, and of the first and the last joint all."""
 
 
 @dataclass(frozen=True)
@@ -329,8 +330,9 @@ def _moved(
     text = (
         f"With the {what} of the calibration the median error is {length_mm(kept_mm, 4)}, with what can be "
         f"found anew {length_mm(after_mm, 4)}: the {where} elsewhere than then"
-        f"{', and the calibration itself fits' if fits else ''}. "
-        f"Leave {' and '.join(option for option, is_given in given.items() if is_given)} out."
+        f"{', and the calibration itself fits' if fits else ', or a joint does'}. "
+        f"{'Leave' if fits else _told_by_update(calibration, keeps_frame=with_frame)} "
+        f"{' and '.join(option for option, is_given in given.items() if is_given)} out."
     )
     beside = [
         Notice(notice.kind, f"With what can be found anew: {notice.message[0].lower()}{notice.message[1:]}")
@@ -338,6 +340,14 @@ def _moved(
         if notice.kind == NOT_AS_CALIBRATED
     ]
     return [Notice("setup_moved", text), *beside]
+
+
+def _told_by_update(calibration: Calibration, *, keeps_frame: bool) -> str:
+    """How to ask whether a joint moved, where frame and tool found anew take up most of that but not all."""
+    if not can_be_updated(calibration):
+        return "Leave"
+    kept = "--keep-frame --keep-tool" if keeps_frame else "--keep-tool"
+    return f"If nobody moved these, truearm update {kept} tells which joint it is. Otherwise leave"
 
 
 def _gross(

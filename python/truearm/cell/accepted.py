@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.checks import unsure_steps
 from truearm.cell.poses_file import GROUP
-from truearm.cell.scatter import sigma_of_mean_m
+from truearm.cell.scatter import sigma_of_mean_m, weighted_mean
 from truearm.cell.session import Session
 from truearm.measurements import Measurements
 from truearm.tables.columns import APPROACH, POSE, PURPOSE, READINGS
@@ -35,11 +35,11 @@ SET_UP = "session"
 
 
 def accepted_table(session: Session, kind: str = "pose", *, most: int | None = None) -> pd.DataFrame:
-    """A row for each measured step: the mean of its accepted readings, in rad and m.
+    """A row for each measured step: the mean of its accepted readings, weighted by 1/sigma^2, in rad and m.
 
     Columns: pose (from 1, in the list of poses), q1 ... qN, x, y, z, sigma, qw ... qz where orientation was
     measured, approach, readings (how many were accepted), temperature_c where there is one, other features.
-    Orientation, temperature and features are means of those readings that have them.
+    Orientation, temperature and features are means of those readings that have them, the last two plain.
     Where there are purposes, purpose too. sigma is that of the mean.
 
     Poses also have a group where the list of poses gave one, and where something moved: those between a check
@@ -90,18 +90,20 @@ def points_and_joints(session: Session, kind: str) -> tuple[list[int], Floats, F
 
 def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
     first = rows[0]
-    joints = np.mean([json.loads(row["joints"]) for row in rows], axis=0)
+    sigmas_m = [row["sigma"] for row in rows]
+    joints = weighted_mean([json.loads(row["joints"]) for row in rows], sigmas_m)
+    point = weighted_mean([[row[axis] for axis in "xyz"] for row in rows], sigmas_m)
     merged: dict[str, Any] = {"step": first["step"], POSE: first["pose"] + 1}
     if first["purpose"]:
         merged[PURPOSE] = first["purpose"]
     merged |= {f"q{j + 1}": value for j, value in enumerate(joints.tolist())}
-    merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
-    merged["sigma"] = sigma_of_mean_m([row["sigma"] for row in rows])
-    turned = [[row[name] for name in TURN] for row in rows if row["qw"] is not None]
+    merged |= dict(zip("xyz", point.tolist(), strict=True))
+    merged["sigma"] = sigma_of_mean_m(sigmas_m)
+    turned = [row for row in rows if row["qw"] is not None]
     if turned:
-        turns = np.array(turned, dtype=np.float64)
+        turns = np.array([[row[name] for name in TURN] for row in turned], dtype=np.float64)
         turns *= np.where(turns @ turns[0] < 0.0, -1.0, 1.0)[:, None]
-        turn = turns.mean(axis=0)
+        turn = weighted_mean(turns.tolist(), [row["sigma"] for row in turned])
         merged |= dict(zip(TURN, (turn / np.linalg.norm(turn)).tolist(), strict=True))
     merged |= {APPROACH: first["approach"], READINGS: len(rows)}
     further = [{"temperature_c": row["temperature_c"]} | json.loads(row["features"]) for row in rows]

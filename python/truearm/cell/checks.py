@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.cell_file import ProcessSection
 from truearm.cell.in_a_row import STEADY
-from truearm.cell.scatter import explained_m, sigma_of_mean_m
+from truearm.cell.scatter import explained_m, sigma_of_mean_m, weighted_mean
 from truearm.cell.session import Session
 from truearm.errors import Notice, WorkError, list_rows
 from truearm.units import MM_PER_METRE
@@ -191,4 +191,5 @@ def _mean(session: Session, step: int, attempts: str) -> tuple[Floats, float]:
     accepted = json.loads(attempts)
     readings = [each for each in session.readings_of(step) if each.attempt in accepted]
     points = [each.point for each in readings if each.point is not None]
-    return np.mean(points, axis=0), sigma_of_mean_m([each.sigma_m for each in readings])
+    sigmas_m = [each.sigma_m for each in readings if each.point is not None]
+    return weighted_mean(points, sigmas_m), sigma_of_mean_m(sigmas_m)

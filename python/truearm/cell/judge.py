@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.scatter import explained_m
+from truearm.cell.scatter import explained_m, weighted_mean
 from truearm.cell.session import Point, Stored
 
 Floats = NDArray[np.float64]
@@ -42,8 +42,8 @@ class Rules(NamedTuple):
     Attributes:
         contacts: Readings that have to agree.
         attempts: How many are made at the most.
-        agree_m: How far readings of a pose may be from one of them; farther only as far as what they state
-            as their standard deviations explains.
+        agree_m: How far two readings of a pose may be apart; farther only as far as what both state as their
+            standard deviations explains.
         likely_m: How far a reading may be from the prediction without being suspicious.
     """
 
@@ -56,41 +56,50 @@ class Rules(NamedTuple):
 def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict:
     """Judge all readings of a pose so far.
 
-    The largest set of readings that agree with one of them is accepted if it is large enough, and larger than
-    all readings that contradict it together. Where it is far from the prediction (3,), it has to have one
-    reading more.
+    The largest set of readings that all agree with one another is accepted if it is large enough, and larger
+    than all other readings together. Of several such sets only what all hold counts: a coarse reading, which
+    agrees with two that contradict, speaks for neither. Where it is far from the prediction (3,), it has to
+    have one reading more.
     """
     if not readings:
         return NOTHING_YET
     valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
     points = [point for _, point in valid]
-    agreeing = _largest_cluster(points, [reading.sigma_m for reading, _ in valid], rules.agree_m)
-    mean = mean_point([points[k] for k in agreeing]) if agreeing else None
-    off_m = math.inf if mean is None else math.dist(mean, expected.tolist())
-    far = mean is not None and off_m > rules.likely_m
+    sigmas_m = [reading.sigma_m for reading, _ in valid]
+    clusters, off_m = _largest_clusters(points, sigmas_m, rules.agree_m), math.inf
+    held_by_all = frozenset.intersection(*clusters)
+    agreeing = sorted(held_by_all or clusters[0])
+    if agreeing:
+        mean = weighted_mean([points[k] for k in agreeing], [sigmas_m[k] for k in agreeing])
+        off_m = math.dist(mean, expected)
+    far = bool(agreeing) and off_m > rules.likely_m
     needed = rules.contacts + (REPEATS_WHEN_SUSPICIOUS if far else 0)
-    if len(agreeing) >= needed and 2 * len(agreeing) > len(points):
+    if len(held_by_all) >= needed and 2 * len(held_by_all) > len(points):
         return Verdict("accept", tuple(valid[k][0].attempt for k in agreeing), "", far, off_m)
     reason = _reason(len(readings), len(points), len(agreeing), far=far)
     return Verdict("again" if len(readings) < rules.attempts else "give up", (), reason, far, off_m)
 
 
-def mean_point(points: Sequence[Point]) -> Point:
-    """The mean of points."""
-    return tuple([math.fsum(column) / len(points) for column in zip(*points, strict=True)])
+def _largest_clusters(
+    points: Sequence[Point], sigmas_m: Sequence[float], agree_m: float
+) -> list[frozenset[int]]:
+    """Numbers of the most points found that all agree with one another, of each such set.
 
-
-def _largest_cluster(points: Sequence[Point], sigmas_m: Sequence[float], agree_m: float) -> list[int]:
-    """Numbers of the most points that all agree with one of them, the first such."""
-    best: list[int] = []
-    for centre, sigma_m in zip(points, sigmas_m, strict=True):
-        near = [
-            k
-            for k, (point, own_m) in enumerate(zip(points, sigmas_m, strict=True))
-            if math.dist(point, centre) <= max(agree_m, explained_m(sigma_m, own_m))
-        ]
-        if len(near) > len(best):
-            best = near
+    Beside each point, the nearest first, those are taken that agree with all taken before.
+    """
+    best = [frozenset[int]()]
+    for centre in points:
+        taken = set[int]()
+        for k in sorted(range(len(points)), key=lambda k: math.dist(points[k], centre)):
+            if all(
+                math.dist(points[k], points[other]) <= max(agree_m, explained_m(sigmas_m[k], sigmas_m[other]))
+                for other in taken
+            ):
+                taken.add(k)
+        if len(taken) > len(best[0]):
+            best = []
+        if not best or len(taken) == len(best[0]):
+            best.append(frozenset(taken))
     return best
 
 

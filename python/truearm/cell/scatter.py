@@ -5,8 +5,13 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truearm.cell.cell_file import ProcessSection
 from truearm.units import MM_PER_METRE, to_si
+
+Floats = NDArray[np.float64]
 
 AS_RARE_AS: Final = 4.0
 """A distance is explained up to one as rare as a normal value this many standard deviations off."""
@@ -30,9 +35,21 @@ def explained_m(one_m: float, other_m: float) -> float:
     return _most() * math.hypot(one_m, other_m)
 
 
+def weighted_mean(values: Sequence[Sequence[float]], sigmas_m: Sequence[float]) -> Floats:
+    """Mean (m,) of what each reading says, of n readings (n, m) of these standard deviations, m.
+
+    Each counts by 1/sigma^2, so that a coarse one adds what it tells and spoils nothing.
+    """
+    return np.average(np.asarray(values, dtype=np.float64), axis=0, weights=_weights(sigmas_m))
+
+
 def sigma_of_mean_m(sigmas_m: Sequence[float]) -> float:
-    """Standard deviation of each coordinate, m, of the mean of readings that have these."""
-    return math.fsum(sigmas_m) / len(sigmas_m) / math.sqrt(len(sigmas_m))
+    """Standard deviation of each coordinate, m, of that mean of readings that have these, above zero."""
+    return float(1.0 / math.sqrt(_weights(sigmas_m).sum()))
+
+
+def _weights(sigmas_m: Sequence[float]) -> Floats:
+    return np.asarray(1.0 / np.square(np.asarray(sigmas_m, dtype=np.float64)))
 
 
 def told_coarse(sigma_m: float, process: ProcessSection) -> str:

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import linearise, setup_jacobian
+from truearm.defaults import ROBUST
 from truearm.fits.core_set import core_set, distances_apart
 from truearm.fits.details import ConstantDetails
+from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.fitting import Fits, Task, constant_variances
 from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import held_parts
@@ -101,9 +103,21 @@ def standard_errors(task: Task, fits: Fits, covariance: Floats) -> Floats:
     return np.asarray(np.sqrt(apart[chosen] ** 2 + np.maximum(known, 0.0)))
 
 
+def _widened(task: Task, fits: Fits) -> float:
+    """Root mean square of what a robust loss leaves of rows that are no outliers, in units of its noise."""
+    if fits.variable is not None or task.selection.distances or task.options.robust == ROBUST:
+        return 1.0
+    rows = FittedRows.of(fits, np.zeros(len(fits.data), dtype=np.int64), task.selection)
+    kept = rows.residual[rows.score <= 1.0]
+    squares = kept**2 / constant_variances(fits, task.selection)[rows.score <= 1.0]
+    freedom = max(int(np.count_nonzero(kept)) - fits.identifiability.total_rank, 1)
+    return float(np.sqrt(squares.sum() / freedom)) or 1.0
+
+
 def constant_details(task: Task, fits: Fits) -> ConstantDetails:
     """What a fit found beside its constants, with how far these are off."""
     names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
     common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
-    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
+    rank, widened = fits.identifiability.total_rank, _widened(task, fits)
+    scale = KnownScale.of(fit.residuals, rank, fits.data.sigma_m, common, widened)
     return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)

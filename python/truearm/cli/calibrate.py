@@ -271,7 +271,7 @@ def _judged_in_words(calibration: "Calibration") -> str:
     """How many were judged: rows, or poses where those are fewer, or distances, of which a pair has one."""
     validation, held = calibration.validation, calibration.held
     if calibration.selection.distances and held is not None:
-        return count_of(len(held.errors[calibration.model_name].position), "held-out distance")
+        return count_of(int(held.errors[calibration.model_name].measured.sum()), "held-out distance")
     if validation.n_holdout_poses < validation.n_holdout:
         return validation.poses_judged
     return count_of(validation.n_holdout, "held-out row")

@@ -25,7 +25,7 @@ from truearm.doubts.of_results import (
     poses_aside,
     stated_too_large,
 )
-from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, Outliers
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
 from truearm.doubts.slips import main_slips, slips
@@ -138,7 +138,8 @@ def _doubted(
     fit instead; and the constants that rows far off did not bend, if these were looked for.
     """
     doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
-    if _many_are_off(found, doubted):
+    too_large = any(notice.kind == STATED_TOO_LARGE for notice in doubted)
+    if not too_large and _many_are_off(found, doubted):
         with stages("looking for lost rows"):
             shifted = fits_shifted(task, data)
     if shifted:
@@ -152,7 +153,7 @@ def _doubted(
         doubted = _of_errors(task, told, data, Outliers.of(told), robust)
     doubted[1:1] = framed
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
-    if not framed and any(notice.kind in wrong for notice in doubted):
+    if not (framed or too_large) and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
             otherwise = fits_otherwise(task, data) or turned_later(task, data, BETTER, NEAR_M)
         if otherwise:
@@ -187,12 +188,14 @@ def _of_errors(
     judged, best = found.validation, found.model_name
     points = None if found.selection.distances else found.held
     models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
+    too_large = stated_too_large(data, judged, best, points, outliers)
+    outliers = replace(outliers, stated_too_large=bool(too_large))
     return [
+        *too_large,
         *zero_notices(
             task, data, [found.models[name] for name in (NOMINAL, CONSTANT)], found.identifiability.determined
         ),
         *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data, judged, best, points, outliers),
         *constant_is_better(judged, best, points, outliers),
         *_rounded(found, data),
     ]

@@ -10,7 +10,7 @@ from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.doubts.grids import BETWEEN, grid_steps, grid_words
 from truearm.doubts.held_tool import TURN_MORE, held_tool, held_words
-from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
+from truearm.doubts.outliers import NO_OUTLIERS, STATED_TOO_LARGE, Outliers, judged_means_mm
 from truearm.doubts.what_to_check import CHECKS
 from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection
@@ -55,6 +55,7 @@ MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
 SAME: Final = 0.97
 """Mean errors whose ratio is between it and one are as good as the same."""
+SIGMA_FIRST: Final = "Correct first what the rows state as their sigma, and calibrate again."
 UNLIKELY: Final = 0.5
 """Noise leaves no mean error of so small a part of its own."""
 FEWEST_OF_LEVEL: Final = 5
@@ -64,7 +65,6 @@ ALIKE: Final = 2.0
 """Sigmas whose ratio is below it are of one level."""
 SURE: Final = 2.0
 """Standard errors of the mean difference over poses beyond which one model does better than another."""
-STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
@@ -328,7 +328,11 @@ def no_help(
         return []
     if nothing_to_gain(before_mm, after_mm, floor_mm):
         start, why = "There is nothing to gain", AS_THE_TABLE
-        if before_mm >= NEAR_MM and not leaves_noise(best):
+        if outliers.stated_too_large:
+            start, why = "The calibration gains nothing", SIGMA_FIRST
+        elif outliers.named and outliers.fate == FULL_WEIGHT:
+            start, why = "The calibration gains nothing", _these_first(outliers)
+        elif before_mm >= NEAR_MM and not leaves_noise(best):
             start, why = gains_nothing(best)
         elif before_mm >= NEAR_MM:
             why = (
@@ -339,7 +343,7 @@ def no_help(
             f"{start}: the {what}{outliers.without} is {length_mm(after_mm, 4)}, that of the nominal "
             f"model {length_mm(before_mm, 4)} already. {why}"
         )
-        if outliers.means_mm:
+        if outliers.means_mm and outliers.fate != FULL_WEIGHT:
             text += f" Correct the rows that are far off, or leave them out: {outliers.judged}."
         return [Notice(NO_GAIN, text)]
     text = (
@@ -362,6 +366,8 @@ def gains_nothing(best: str) -> tuple[str, str]:
 
 def to_check(outliers: Outliers) -> str:
     """What to look at where a calibration does not help: first rows that are far off, if any are."""
+    if outliers.stated_too_large:
+        return SIGMA_FIRST
     if outliers.exchanged:
         return "Put right first what is exchanged, or leave it out, and calibrate again."
     return f"{CHECKS}." if not outliers.named else f"{_these_first(outliers)} {CHECKS}."

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 ROWS_EXCHANGED: Final = "rows_exchanged"
 TARGETS_EXCHANGED: Final = "targets_exchanged"
+STATED_TOO_LARGE: Final = "stated_too_large"
 EXCHANGED: Final = (ROWS_EXCHANGED, TARGETS_EXCHANGED)
 
 
@@ -28,6 +29,7 @@ class Outliers:
         means_mrad: As means_mm, of the orientation; empty where it was not fitted.
         fate: What became of them in the fits, as fate_of_outliers has it.
         exchanged: Whether some were found to be exchanged, which notices name.
+        stated_too_large: Whether rows state a sigma that is too large, which a notice says.
     """
 
     named: str
@@ -37,6 +39,7 @@ class Outliers:
     means_mrad: Mapping[str, float] = field(default_factory=dict)
     fate: str = ""
     exchanged: bool = False
+    stated_too_large: bool = False
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "Outliers":
@@ -45,13 +48,14 @@ class Outliers:
         if rows is None:
             return NO_OUTLIERS
         found = rows.outliers()
-        held = None if calibration.selection.distances else calibration.held
+        held = calibration.held
         means = {} if held is None else held.means_without_mm(found)
         turns = {} if held is None else held.turns_without_mrad(found)
         judged = held.among(found, calibration.model_name) if held is not None and means else []
         named, among = (list_outliers(each, rows.data.files) for each in (found, judged))
-        exchanged = any(notice.kind in EXCHANGED for notice in calibration.notices)
-        return cls(named, means, among, found, turns, fate_of_outliers(calibration), exchanged)
+        kinds, fate = {notice.kind for notice in calibration.notices}, fate_of_outliers(calibration)
+        exchanged, too_large = not kinds.isdisjoint(EXCHANGED), STATED_TOO_LARGE in kinds
+        return cls(named, means, among, found, turns, fate, exchanged, too_large)
 
     @property
     def without(self) -> str:

@@ -12,6 +12,7 @@ from truearm._core import setup_jacobian
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import task_of
 from truearm.doubts.nominal_misfit import some_rows
+from truearm.doubts.row_order import FEWEST_VISITS
 from truearm.fits.core_set import Selection, core_set
 from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitted_rows import FittedRows
@@ -30,6 +31,8 @@ MOST_VALUES: Final = 900
 """Coordinates at the most that are looked at: they tell enough, and their covariance is quick."""
 TRUSTED: Final = 0.5
 """Rows of a lesser weight are outliers."""
+MOST_TARGETS: Final = MOST_VALUES // (AXES * FEWEST_VISITS)
+"""Targets at the most, those that most rows hold, so that enough visits are looked at."""
 FAINT: Final = 0.01
 """Part of a column that is left beside what was fitted, below which that imitates it."""
 
@@ -44,6 +47,7 @@ class Visits:
         shots: How many of them hold it (v, m).
         stated: Mean of the variances that they state (v,), m^2.
         own: Variance that each shot has of its own beside, which those of a visit differ by, m^2.
+        targets: Which of the fitted targets are looked at (t,), m = 3 t.
     """
 
     rows: Rows
@@ -51,17 +55,20 @@ class Visits:
     shots: Floats
     stated: Floats
     own: float
+    targets: Rows
 
     @classmethod
     def of(cls, fitted: FittedRows, selection: Selection, progress: Floats, trusted: Mask) -> "Visits":
         """Those of `trusted` rows (n,), some where they are many, set-up after set-up."""
         parts = held_parts(fitted.data, selection)[:, :-1]
+        targets = np.sort(np.argsort(-parts[trusted].sum(axis=0), kind="stable")[:MOST_TARGETS])
+        parts = parts[:, targets]
         _, group = np.unique(fitted.data.group, return_inverse=True)
         order = np.lexsort((progress, group.reshape(-1)))
         order = order[(trusted & parts.any(axis=1))[order]]
         visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
         held = np.repeat(parts, AXES, axis=1)[order]
-        each = fitted.residual[order, : held.shape[1]] * held
+        each = fitted.residual[np.ix_(order, _columns(targets))] * held
         shots = means(held.astype(np.float64), visits) * np.bincount(visits)[:, None]
         residual = means(each, visits) * np.bincount(visits)[:, None] / np.maximum(shots, 1.0)
         stated = means(np.square(fitted.data.stated_sigma_m[order]), visits)
@@ -70,7 +77,8 @@ class Visits:
         own -= float(np.average(stated, weights=further)) if further.any() else 0.0
         _, first = np.unique(visits, return_index=True)
         some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
-        return cls(order[first[some]], residual[some], shots[some], stated[some], max(own, 0.0))
+        rows = order[first[some]]
+        return cls(rows, residual[some], shots[some], stated[some], max(own, 0.0), targets)
 
     @property
     def held(self) -> Mask:
@@ -136,7 +144,7 @@ class Whitened:
         seen = Visits.of(fitted, found.selection, progress, trusted)
         rows, held = seen.rows, seen.held
         data = fitted.fitted.select(rows)
-        inputs, arm, setup, joints = _derivatives(found, data, held)
+        inputs, arm, setup, joints = _derivatives(found, data, held, seen.targets)
         own = setup.reshape(*held.shape, len(found.groups), -1).sum(axis=2)
         size = held.shape[1]
         noise, single = seen.noise(found.spread.noise(arm, np.zeros(size, dtype=np.bool_)))
@@ -211,23 +219,30 @@ def _widened(found: Calibration) -> float:
     return 1.0 if found.variable is None else found.variable.hyper["extrapolation"][0]
 
 
-def _derivatives(found: Calibration, data: Measurements, held: Mask) -> tuple[Floats, Floats, Floats, Floats]:
-    """Inputs (v, I) of rows, and derivatives of what they hold (v, m, ...) by the arm's parameters, by the
-    unknowns of all set-ups, and by the joint values.
+def _columns(targets: Rows) -> Rows:
+    """Columns of residuals, three a fitted target, of some of these (t,)."""
+    return np.asarray((AXES * targets[:, None] + np.arange(AXES)).ravel())
+
+
+def _derivatives(
+    found: Calibration, data: Measurements, held: Mask, targets: Rows
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Inputs (v, I) of rows, and derivatives of what they hold (v, m, ...) of some targets by the arm's
+    parameters, by the unknowns of all set-ups, and by the joint values.
     """
     task, setup = task_of(found), found.model.setup
     inputs = model_inputs(task.arm, data, task.options.features)
     parameters = np.ascontiguousarray(found.model.parameters(inputs))
     joints = np.ascontiguousarray(inputs[:, : task.arm.robot.joint_count])
     problem = task.problem(core_set(task.arm.robot, data, task.selection, task.groups), [])
-    own = setup_jacobian(problem, parameters, setup)[:, : held.shape[1]]
+    own = setup_jacobian(problem, parameters, setup)[:, _columns(targets)]
     by_setup = np.zeros((*held.shape, setup_unknowns(task)))
     by_arm = np.zeros((*held.shape, task.arm.table.size))
     width = own.shape[2]
     for number, group in enumerate(task.groups):
         rows = np.flatnonzero(data.group == group)
         by_setup[rows, :, number * width : (number + 1) * width] = own[rows]
-        for target, point in enumerate(setup.targets[number]):
+        for target, point in enumerate(setup.targets[number][targets]):
             end = np.eye(4)
             end[:AXES, AXES] = point
             chain = task.arm.chain(task.arm.robot.flange @ end)

@@ -193,6 +193,12 @@ def distance_count(data: Measurements) -> int:
     return len(_distances(data))
 
 
+def distance_ends(data: Measurements) -> Rows:
+    """The rows (d, 2) of each distance, in the core's order; of one to a fixed point the same twice."""
+    ends = [(row, row if to_anchor else other) for row, to_anchor, other, _ in _distances(data)]
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)
+
+
 def distances_apart(data: Measurements, poses: Rows) -> tuple[Rows, Rows]:
     """The row that holds each distance (d,), in the core's order, and a number (d,) that its shots share.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.arrays import hold_read_only
 from truearm.errors import Notice, count_of
-from truearm.fits.core_set import Selection
+from truearm.fits.core_set import Selection, distance_ends
 from truearm.fits.fitting import Fits, constant_variances
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split
@@ -39,8 +39,9 @@ class FittedRows:
             orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
             pair once.
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
-        distance_m: How far the farthest target of each row is from where the model has it (n,); zero for
-            distances.
+        distance_m: How far the farthest target of each row is from where the model has it (n,). A distance is
+            off by so much in its row, in both of a pair; those of a calibration are judged by constants that
+            rows far off do not bend, as are their scores.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
@@ -71,7 +72,10 @@ class FittedRows:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
             score = _judge_constant(fits, residual, selection)
-            distance = np.zeros(len(side)) if selection.distances else farthest_m(residual, selection)
+            if selection.distances:
+                distance = at_rows(np.abs(residual[:, 0]), fits.data)
+            else:
+                distance = farthest_m(residual, selection)
             found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
         else:
             variable = fits.variable
@@ -176,9 +180,18 @@ def farthest_m(residual: Floats, selection: Selection) -> Floats:
 
 
 def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> Floats:
-    """Score (n,) of each row against the constant model; rows of distances are not judged."""
+    """Score (n,) of each row against the constant model."""
+    variances = constant_variances(fits, selection)
     if selection.distances:
-        return np.zeros(len(fits.data))
-    squares = (residual**2 / constant_variances(fits, selection)).sum(axis=1)
+        variances = variances[distance_ends(fits.data)[:, 0]]
+    squares = (residual**2 / variances).sum(axis=1)
     freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
-    return np.asarray(squares / overwhelming(freedom))
+    score = np.asarray(squares / overwhelming(freedom))
+    return at_rows(score, fits.data) if selection.distances else score
+
+
+def at_rows(values: Floats, data: Measurements) -> Floats:
+    """Values (d,) of distances at their rows (n,), in both of a pair; zero in rows without one."""
+    found = np.zeros(len(data))
+    found[distance_ends(data)] = values[:, None]
+    return found

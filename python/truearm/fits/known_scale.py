@@ -18,18 +18,24 @@ class KnownScale:
             of earlier versions that do not tell.
         common: Share of the variance that constants leave of positions which all targets of a pose have in
             common: it is the flange that is off.
+        widened: Factor on the standard deviations of an update. The noise of a robust loss is a median, which
+            is theirs of normal errors alone: it is the root mean square of what rows that are no outliers
+            leave, in units of it. One for least squares, and for what varies.
     """
 
     freedom: int
     sigma_m: float | None
     common: float = 0.0
+    widened: float = 1.0
 
     @classmethod
-    def of(cls, residual: Floats, rank: int, stated: Floats | None, common: float) -> "KnownScale":
+    def of(
+        cls, residual: Floats, rank: int, stated: Floats | None, common: float, widened: float = 1.0
+    ) -> "KnownScale":
         """That of residuals, zero where not measured, with `rank` unknowns and stated sigmas (n,), m."""
         told = np.empty(0) if stated is None else stated[np.isfinite(stated)]
         usual = float(np.median(told)) if len(told) else 0.0
-        return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common)
+        return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)
 
 
 def common_share(residual: Floats, weight: Floats, targets: int, noise_m: float) -> float:

@@ -106,7 +106,11 @@ def _no_gain(arm: Row) -> Iterator[Reason]:
     if not helps(before, after):
         none = nothing_to_gain(before, after, arm["floor_mm"])
         said = "There is nothing to gain" if none else "The calibration does not help"
-        words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
+        far = arm.get("outliers_named", "")
+        if none and far:
+            said = "The calibration gains nothing"
+        look = f" Look at its outliers first: {far}." if far else ""
+        words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm.{look}"
         yield Reason("no_gain", words, after / before)
 
 

@@ -24,7 +24,7 @@ FEWEST_POSES: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class HeldRows:
-    """n rows and what each model missed there. Where distances were judged, errors have rows of their own.
+    """n rows and what each model missed there. The error of a pair's distance is at the first of its rows.
 
     Attributes:
         readings: Joint readings (n, N), rad or m.

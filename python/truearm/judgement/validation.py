@@ -84,7 +84,7 @@ class RowErrors:
 
     Attributes:
         position: At the judged target (n, 3), m, of several fitted ones at the first that a row holds; of
-            distances (d, 1).
+            distances (d, 1), or (n, 1) at the first of a pair's rows.
         orientation: Rotation vectors (n, 3), rad; None where orientation took no part.
     """
 
@@ -107,6 +107,12 @@ class RowErrors:
         if self.orientation is None:
             return np.full(len(self.position), np.nan)
         return np.asarray(np.linalg.norm(self.orientation, axis=1))
+
+    def at_rows(self, rows: NDArray[np.int64], count: int) -> "RowErrors":
+        """Those of distances (d, 1) as of `count` rows, each at one of `rows` (d,), NaN at the others."""
+        position = np.full((count, 1), np.nan)
+        position[rows] = self.position
+        return RowErrors(position)
 
     def statistics(self) -> Errors:
         """Statistics over the rows that were measured; there must be one."""

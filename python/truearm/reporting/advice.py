@@ -14,12 +14,11 @@ from truearm.doubts.of_results import (
     HELD_TOOL,
     HIDING,
     SAME,
-    STATED_TOO_LARGE,
     UNLIKELY,
     WOULD_FIT,
     to_check,
 )
-from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
@@ -90,7 +89,7 @@ def _refused(facts: Facts) -> Iterator[Advice]:
 
 
 def _checks(facts: Facts) -> Iterator[Advice]:
-    if any(_exchanged(facts)):
+    if any(_exchanged(facts)) or facts.noticed(STATED_TOO_LARGE):
         return
     words = to_check(NO_OUTLIERS if any(_would_fit(facts)) else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())

@@ -14,7 +14,7 @@ from truearm.description.one_turn import one_turn
 from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.grids import grid_steps, grid_words
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
-from truearm.doubts.outliers import NO_OUTLIERS, Outliers
+from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
 from truearm.evaluation import Evaluation
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.fits.stillness import still_warning
@@ -172,7 +172,7 @@ class Facts:
         """Mean held-out position error of a model, the best by default, mm; outliers are no part of it."""
         name = model or self.best
         if self.held is None:
-            return self.calibration.validation.holdout[name].position.mean
+            return judged_means_mm(self.calibration.validation, self.outliers)[name]
         return float(np.nanmean(self.kept_errors_mm(name)))
 
     def kept_errors_mm(self, model: str) -> Floats:

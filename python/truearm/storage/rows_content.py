@@ -77,7 +77,7 @@ def unpack(content: Mapping[str, Any], arrays: Arrays, *, selection: Selection) 
 
 
 def _of_distances(rows: FittedRows) -> FittedRows:
-    """Rows whose residuals are those of their distances; none of them is far from a point.
+    """Rows whose residuals are those of their distances, in files of earlier versions `distance_m` as well.
 
     Raises:
         InputError: If there are not as many residuals as distances.
@@ -85,7 +85,8 @@ def _of_distances(rows: FittedRows) -> FittedRows:
     count = distance_count(rows.data)
     if rows.residual.shape != (count, 1):
         raise InputError(f"the residuals have shape {rows.residual.shape}", rule=f"It must be ({count}, 1)")
-    return replace(rows, distance_m=np.zeros(len(rows.data)))
+    known = rows.distance_m.shape == (len(rows.data),)
+    return rows if known else replace(rows, distance_m=np.zeros(len(rows.data)))
 
 
 def _stated_sides(data: Measurements, features: Sequence[str]) -> list[str]:

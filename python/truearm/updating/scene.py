@@ -19,7 +19,7 @@ from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.updating.parts import part_of, places_of
-from truearm.updating.scale import sigmas_m
+from truearm.updating.scale import known_scale, sigmas_m
 from truearm.updating.unknowns import Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
@@ -169,7 +169,7 @@ class Scene:
             self.inputs, self.arm_jacobian(state), self.tied_jacobian(state)
         )
         anew, seen = self.linear(state).jacobian[:, self.unknowns.anew], self.seen.reshape(-1)
-        return without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
+        return self._widened**2 * without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
 
     def scatter(self, state: State) -> Floats:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
@@ -180,7 +180,7 @@ class Scene:
         seen = self.seen.reshape(-1)
         own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
         finest = FINEST**2 * np.eye(len(self.orientation))
-        whole = block_diag(*(noise + own + finest))
+        whole = block_diag(*(self._widened**2 * (noise + own) + finest))
         return np.asarray(whole[np.ix_(seen, seen)])
 
     def _stated_beyond_noise(self) -> Floats:
@@ -196,6 +196,10 @@ class Scene:
             return stated
         noise, _ = noises_of(details.hyper)
         return np.maximum(stated - (details.inflation * noise) ** 2, 0.0)
+
+    @property
+    def _widened(self) -> float:
+        return known_scale(self._calibration).widened
 
     def _moved_parameters(self, state: State) -> Floats:
         """Parameters (n, L, 5) of the arm in a state."""
