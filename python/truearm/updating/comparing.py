@@ -291,8 +291,7 @@ class _Found:
             judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
         kept = KeptParts(self.calibration, scene, {tool.group for tool in tools if tool.moved})
-        slipped = [slip.notice for slip in meanwhile(scene, found)]
-        notices = (*notices, *kept.notices, *slipped)
+        notices = (*notices, *kept.notices, *(slip.notice for slip in self._slipped(found)))
         judged = left_out_errors(self.calibration, scene, found)
         told = Update(
             calibration=self.calibration,
@@ -311,6 +310,12 @@ class _Found:
         )
         report = {**told.to_dict(), "options": asdict(self.options)}
         return _with_certainty(told, updated(kept, found, judged, report, notices))
+
+    def _slipped(self, found: Estimate) -> list[Slip]:
+        """What stood otherwise from some row on: a kept part that did so from the first row on is none of it."""
+        if self.options.keep_frame or self.options.keep_tool:
+            return changed_meanwhile(self.calibration, self.rows.scene.data, self.options.use)
+        return meanwhile(self.rows.scene, found)
 
 
 def _with_certainty(told: Update, new: Calibration) -> Update:
