@@ -312,7 +312,7 @@ class _Found:
         return _with_certainty(told, updated(kept, found, judged, report, notices))
 
     def _slipped(self, found: Estimate) -> list[Slip]:
-        """What stood otherwise from some row on: a kept part that did so from the first row on is none of it."""
+        """What stood otherwise from some row on; not what was kept and did so from the first."""
         if self.options.keep_frame or self.options.keep_tool:
             return changed_meanwhile(self.calibration, self.rows.scene.data, self.options.use)
         return meanwhile(self.rows.scene, found)
