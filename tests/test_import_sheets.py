@@ -34,7 +34,7 @@ def test_units_below_the_names_have_to_agree_with_those_stated(tmp_path: Path) -
     assert import_table(path, plan(length_unit="m")).frame["x"].tolist() == [1000.0, 1500.0]
 
 
-@pytest.mark.parametrize("row", ["deg,deg,mm,mm,7", "1,-,1,-,1", "Grad,Grad,mm,mm,mm"])
+@pytest.mark.parametrize("row", ["deg,deg,mm,mm,7", "1,-,1,-,1", "turn,turn,mm,mm,mm"])
 def test_a_row_that_holds_anything_else_stays(row: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="in row 1. It must hold numbers"):
         import_table(write(tmp_path, below(row)), plan())

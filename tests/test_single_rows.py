@@ -123,7 +123,7 @@ def test_an_arm_of_a_fleet_is_compared_without_outliers(spoilt):
     assert not {"worse", "stands_out"} & {reason.kind for reason in reasons(row, fleet, LimitsSection())}
     exact = {**row, "nominal_without_outliers_mm": 0.03}
     (no_gain,) = (each.words for each in reasons(exact, [exact], LimitsSection()) if each.kind == "no_gain")
-    assert no_gain.startswith("There is nothing to gain: its mean error is 0.0")
+    assert no_gain.startswith("The calibration gains nothing: its mean error is 0.0")
 
 
 def test_where_there_is_nothing_to_gain_gross_rows_are_no_wrong_data():

@@ -43,7 +43,7 @@ def test_a_wrong_zero_that_is_found_in_one_fit_is_found_in_the_other(name, joint
     said = calibration.validation.holdout[VARIABLE].position.mean
     assert said < 0.5
     assert fresh_error_mm(calibration, arm) < 2.0 * said
-    assert f"theta{joint}" in " ".join(map(str, calibration.notices))
+    assert f"the zero of joint {joint} " in " ".join(map(str, calibration.notices))
 
 
 def test_a_fit_to_all_rows_that_goes_astray_is_not_kept(monkeypatch):

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from truearm.certainty.threes import repeated, threes
 from truearm.revision import Carried
@@ -60,6 +59,8 @@ class Successive:
 
         What shows in the later rows is what these updates left of the errors before them.
         """
+        from scipy.linalg import block_diag  # noqa: PLC0415 - slow to import
+
         shown = self.unknown_to(later.jacobian, later.setup).reshape(-1, len(self.own))
         onward = np.eye(len(self.own) + len(later.own))
         onward[len(self.own) :, : len(self.own)] = -later.response @ shown

@@ -107,7 +107,7 @@ def likeliest_step(
 
     gram, pull, unit = _behind(left, columns)
     places = np.concatenate([[0] * others, np.arange(BESIDE, len(gram) - BESIDE + 1)]).astype(np.int64)
-    if not len(places):
+    if not len(places) or left.freedom <= 0.0:
         return None
     gram, pull, unit = gram[places], pull[places], unit[places]
     told, pull, gram, rank_beside = _without(gram, pull, list(beside))

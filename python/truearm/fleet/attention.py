@@ -62,7 +62,7 @@ KINDS: Final = (
 """The worst first."""
 
 
-SPOILT: Final = ("no_gain", "drift", "mean", "max", "worse", "stands_out")
+SPOILT: Final = ("drift", "mean", "max", "worse", "stands_out")
 """What a gross row can make of an arm that is as it was."""
 
 

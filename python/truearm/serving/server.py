@@ -122,8 +122,9 @@ class Server:
             probe(writer.get_extra_info("socket"), self._bounds.vanished_s)
             await self._served(reader, writer)
         except (MalformedError, UsageError) as error:
-            self._told(f"{_peer(writer)}: {error}; connection closed")
-            await self._say_goodbye(reader, writer, str(error))
+            reason = str(error) if isinstance(error, UsageError) else error.what
+            self._told(f"{_peer(writer)}: {reason}; connection closed")
+            await self._say_goodbye(reader, writer, reason)
         except (OSError, EOFError):
             self._told(f"{_peer(writer)}: left")
 
