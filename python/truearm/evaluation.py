@@ -56,7 +56,6 @@ from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
-from truearm.updating.comparing import changed_meanwhile
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -220,6 +219,8 @@ def _with_slips(
     """What slipped while rows were measured: where that is most of what they miss, in place of what was told
     of the arm.
     """
+    from truearm.updating.comparing import changed_meanwhile  # noqa: PLC0415 - scipy is slow to import
+
     if not can_be_updated(calibration):
         return told
     options, stages = how
