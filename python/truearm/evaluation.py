@@ -219,13 +219,13 @@ def _with_slips(
     """What slipped while rows were measured: where that is most of what they miss, in place of what was told
     of the arm.
     """
-    from truearm.updating.comparing import changed_meanwhile  # noqa: PLC0415 - scipy is slow to import
+    from truearm.updating.comparing import slipped_meanwhile  # noqa: PLC0415 - scipy is slow to import
 
     if not can_be_updated(calibration):
         return told
     options, stages = how
     with stages("looking for what slipped"):
-        slipped = changed_meanwhile(calibration, data, options.use)
+        slipped = slipped_meanwhile(calibration, data, options.use)
     most = any(slip.share > MOSTLY for slip in slipped)
     return [*([] if most else told), *(slip.notice for slip in slipped)]
 

@@ -227,7 +227,7 @@ def update(
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
 
-def changed_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
+def slipped_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
     """What stood otherwise from some row on while an arm was measured that is not as it was calibrated.
 
     Args:
@@ -314,7 +314,7 @@ class _Found:
     def _slipped(self, found: Estimate) -> list[Slip]:
         """What stood otherwise from some row on; not what was kept and did so from the first."""
         if self.options.keep_frame or self.options.keep_tool:
-            return changed_meanwhile(self.calibration, self.rows.scene.data, self.options.use)
+            return slipped_meanwhile(self.calibration, self.rows.scene.data, self.options.use)
         return meanwhile(self.rows.scene, found)
 
 
