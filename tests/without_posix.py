@@ -17,6 +17,7 @@ import tempfile  # noqa: F401
 from multiprocessing import resource_tracker
 from types import SimpleNamespace
 
+import filelock  # noqa: F401
 import serial  # noqa: F401
 
 MODULES = ("fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty")
