@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use serde::Deserialize;
-use truearm_field::StoredAxis;
+use truearm_bank::StoredAxis;
 
 /// The part that every layout has.
 #[derive(Deserialize)]

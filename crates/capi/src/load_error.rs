@@ -1,7 +1,7 @@
 //! Why a calibration could not be read.
 
+use truearm_bank::BankError;
 use truearm_compensate::CompensateError;
-use truearm_field::FieldError;
 use truearm_kinematics::KinematicsError;
 
 /// What is wrong with a calibration file.
@@ -46,7 +46,7 @@ pub enum LoadError {
     Kinematics(#[from] KinematicsError),
     /// The field refused it.
     #[error("this calibration's field cannot be used: {0}")]
-    Field(#[from] FieldError),
+    Field(#[from] BankError),
     /// The model refused it.
     #[error("this calibration's model cannot be used: {0}")]
     Compensate(#[from] CompensateError),

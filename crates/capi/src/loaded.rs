@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use truearm_bank::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Leverage, Levers, UPRIGHT};
 use truearm_compensate::{Limits, Model, Spread};
-use truearm_field::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Leverage, Levers, UPRIGHT};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 use crate::container::Container;
@@ -109,7 +109,7 @@ fn conservative(
     };
     let blocks = blocks(container, &stored.blocks, "conservative")?;
     Ok(Conservative::new(ConservativeParts {
-        tables: Bank { input_count: inputs, parameter_count: truearm_field::BOUNDED, blocks, sag: None },
+        tables: Bank { input_count: inputs, parameter_count: truearm_bank::BOUNDED, blocks, sag: None },
         leverage,
         level: stored.level,
         largest: stored.largest,

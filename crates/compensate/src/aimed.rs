@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use truearm_field::{ConservativeScratch, FieldScratch};
+use truearm_bank::{ConservativeScratch, FieldScratch};
 use truearm_kinematics::{
     Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw, Transform, lane_room,
     load_lanes,

@@ -5,8 +5,7 @@
 //! be shifted differently as well. So may one that rests while the joints move: the way of the joint that goes
 //! farthest counts where it is longer.
 
-use truearm_estimate::ANGLE_ARM;
-use truearm_kinematics::{LaneFrame, norm};
+use truearm_kinematics::{ANGLE_ARM, LaneFrame, norm};
 
 use crate::corrector::{Correction, Corrector};
 use crate::refusal::{Reason, Refusal};

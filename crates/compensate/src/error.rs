@@ -1,6 +1,6 @@
 //! What a model, a corrector or an array can have wrong.
 
-use truearm_kinematics::KinematicsError;
+use truearm_kinematics::{Cancelled, KinematicsError};
 
 /// Why a corrector could not be made, or a path not be worked on at all.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -67,9 +67,9 @@ pub enum CompensateError {
         /// Joints of the other.
         calibrated: usize,
     },
-    /// The work was interrupted.
-    #[error("the work was interrupted")]
-    Cancelled,
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The chain refused its input.
     #[error(transparent)]
     Kinematics(#[from] KinematicsError),

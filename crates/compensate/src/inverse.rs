@@ -121,7 +121,7 @@ impl Inverse {
         let (mut workspace, mut last, mut refused) = (self.workspace(features), seed.to_vec(), Vec::new());
         let places = out.readings.chunks_exact_mut(count).zip(out.residuals.chunks_exact_mut(RESIDUALS));
         for (place, (poses, (readings, residuals))) in poses.chunks_exact(MATRIX).zip(places).enumerate() {
-            run.cancel.check().map_err(|_| CompensateError::Cancelled)?;
+            run.cancel.check()?;
             let piece = Piece { poses, seeds: &last, out: Solved { readings, residuals } };
             let found = dispatch(Work { inverse: self, workspace: &mut workspace, piece });
             if let Some((_, refusal)) = found.first() {

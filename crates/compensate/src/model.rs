@@ -1,6 +1,6 @@
 //! An arm as somebody believes it to be: where readings put its flange.
 
-use truearm_field::Compiled;
+use truearm_bank::Compiled;
 use truearm_kinematics::{Chain, SharedParameters};
 
 use crate::coupling::Coupling;

@@ -3,8 +3,7 @@
 use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, load_lanes, norm};
+use truearm_kinematics::{Cancel, Isa, Kernel, LANES, Lane, dispatch, load_lanes, norm};
 
 use crate::change::Mark;
 use crate::corrector::{Correction, Corrector, Workspace};
@@ -111,7 +110,7 @@ impl Run {
         work: impl Fn(&mut W, P) -> T + Sync + Send,
     ) -> Result<Vec<T>, CompensateError> {
         let guarded = |workspace: &mut W, piece: P| {
-            self.cancel.check().map_err(|_| CompensateError::Cancelled)?;
+            self.cancel.check()?;
             Ok(work(workspace, piece))
         };
         let all = rayon::current_num_threads();

@@ -1,7 +1,6 @@
 //! How a search goes, and what of its task the arm can meet.
 
-use truearm_estimate::ANGLE_ARM;
-use truearm_kinematics::{Chain, Isa, Lane, Parameters, norm};
+use truearm_kinematics::{ANGLE_ARM, Chain, Isa, Lane, Parameters, norm};
 
 use crate::error::CompensateError;
 use crate::model::Model;

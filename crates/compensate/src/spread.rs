@@ -1,6 +1,6 @@
 //! How uncertain a model is of where it puts the tool.
 
-use truearm_field::{Conservative, ConservativeScratch, MOVED, moved_with_setup};
+use truearm_bank::{Conservative, ConservativeScratch, MOVED, moved_with_setup};
 use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::aimed::{Aimed, AimedScratch};

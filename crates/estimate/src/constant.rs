@@ -7,7 +7,7 @@
 
 use faer::{Mat, Par};
 
-use truearm_kinematics::is_length;
+use truearm_kinematics::{Cancel, is_length};
 
 use crate::alike::leave_targets_open;
 use crate::dense::Cholesky;
@@ -21,7 +21,8 @@ use crate::robust::Robust;
 use crate::rows::{Point, residuals_of};
 use crate::setup::Setup;
 use crate::start::initial_setup;
-use crate::{Cancel, EstimateError};
+
+use crate::EstimateError;
 
 /// Gaussian prior of the corrections, zero mean.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,9 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use crate::{Cancel, EstimateError};
+use truearm_kinematics::Cancel;
+
+use crate::EstimateError;
 
 mod eigen;
 mod products;

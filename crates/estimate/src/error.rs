@@ -1,6 +1,6 @@
 //! What can go wrong in an estimate, said with the value, the rule and the way out.
 
-use truearm_kinematics::KinematicsError;
+use truearm_kinematics::{Cancelled, KinematicsError};
 
 /// An estimate that could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -85,8 +85,8 @@ pub enum EstimateError {
         rule: &'static str,
     },
     /// The caller asked to stop.
-    #[error("stopped on request")]
-    Cancelled,
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The chain refused its input.
     #[error(transparent)]
     Kinematics(#[from] KinematicsError),

@@ -12,12 +12,14 @@
 
 use faer::{Mat, MatRef, concat};
 
+use truearm_kinematics::ANGLE_ARM;
+
 use crate::EstimateError;
 use crate::dense::{Orthogonal, singular_values};
 use crate::distance;
 use crate::layout::{Layout, Problem};
 use crate::rows::{Linearised, Point, linearise};
-use crate::scale::{ANGLE_ARM, column_unit, scaled_matrix};
+use crate::scale::{column_unit, scaled_matrix};
 use crate::setup::Setup;
 
 /// A column counts as spanned when less than this share of it stands out of the others' span.

@@ -12,7 +12,6 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes go through several arrays with one index")]
 
 mod alike;
-mod cancel;
 mod choice;
 mod constant;
 pub mod dense;
@@ -42,7 +41,6 @@ mod common;
 mod tests;
 
 pub use alike::setup_precision;
-pub use cancel::Cancel;
 pub use choice::{
     Choice, ChoiceOptions, Criterion, Observability, choose_poses, observability, observability_of,
 };
@@ -56,6 +54,6 @@ pub use minimise::Reason;
 pub use non_negative::non_negative_least_squares;
 pub use robust::Robust;
 pub use rows::{Linearised, Point, linearise, residuals};
-pub use scale::{ANGLE_ARM, column_unit, row_unit, scaled_jacobian};
+pub use scale::{column_unit, row_unit, scaled_jacobian};
 pub use setup::{FrameMode, GroupSetup, Setup};
 pub use start::initial_setup;

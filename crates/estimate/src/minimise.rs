@@ -8,7 +8,9 @@ use crate::packets::Packets;
 use crate::pass::{Normal, normal_equations};
 use crate::rows::{Point, Weighting};
 use crate::setup::Setup;
-use crate::{Cancel, EstimateError};
+use truearm_kinematics::Cancel;
+
+use crate::EstimateError;
 
 /// The unknowns' current values.
 #[derive(Debug, Clone)]

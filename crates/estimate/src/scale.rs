@@ -1,12 +1,9 @@
 //! One unit of each kind: a millimetre and 1/300 rad are alike.
 
 use faer::Mat;
-use truearm_kinematics::is_length;
+use truearm_kinematics::{ANGLE_ARM, is_length};
 
 use crate::EstimateError;
-
-/// Metres that a radian counts, in errors and in changes of parameters and joints: half the length of a lower arm.
-pub const ANGLE_ARM: f64 = 0.3;
 
 /// Metres that a unit of a parameter counts, 5 * link + (theta, d, a, alpha, beta): lengths as they are, angles at
 /// [`ANGLE_ARM`].

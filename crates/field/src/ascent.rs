@@ -129,10 +129,10 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use truearm_estimate::EstimateError;
 
     use super::*;
     use crate::evidence::Score;
+    use truearm_kinematics::Cancelled;
 
     const LIMITS: Limits = Limits { evaluations: 100, gain: 1e-12 };
 
@@ -268,9 +268,9 @@ mod tests {
         let mut left = 3;
         let stops = |point: &[f64]| {
             left -= 1;
-            if left == 0 { Err(FieldError::Estimate(EstimateError::Cancelled)) } else { ridge(point) }
+            if left == 0 { Err(FieldError::Cancelled(Cancelled)) } else { ridge(point) }
         };
         let stopped = climb(stops, &[-1.0, 1.0, -1.0], &ranges(1e3), LIMITS).unwrap_err();
-        assert_eq!((stopped, left), (FieldError::Estimate(EstimateError::Cancelled), 0));
+        assert_eq!((stopped, left), (FieldError::Cancelled(Cancelled), 0));
     }
 }

@@ -9,16 +9,14 @@
 use std::f64::consts::{PI, TAU};
 
 use faer::Mat;
-use truearm_estimate::Cancel;
+use truearm_bank::{
+    Axis, BOUNDED, Bank, Block, Conservative, ConservativeParts, Grid, Input, InputKind, Leverage,
+};
 use truearm_estimate::dense::{Cholesky, parallelism};
-use truearm_kinematics::Chain;
+use truearm_kinematics::{Cancel, Chain};
 
 use crate::FieldError;
-use crate::bank::{Bank, Block};
-use crate::cells::{Axis, Grid};
-use crate::conservative::{BOUNDED, Conservative, ConservativeParts};
-use crate::kernel::{Input, InputKind};
-use crate::leverage::Leverage;
+use crate::leverage_fit::fit_leverage;
 
 /// Cells of a turn along one input; fine curves of single joints are about this wide.
 const FINE: f64 = 40.0;
@@ -69,45 +67,6 @@ pub struct ConservativePlan {
     pub chain: Option<Chain>,
 }
 
-impl Conservative {
-    /// Fits the tables to `fitted`, and raises them by what `fresh`, configurations of their own, shows.
-    ///
-    /// # Errors
-    /// [`FieldError::Length`], [`FieldError::NotFinite`] where values are not positive or there are none,
-    /// [`FieldError::Ends`], [`FieldError::Range`] where samples lie beyond the ranges,
-    /// [`FieldError::NotPositiveDefinite`], or on request.
-    pub fn fit(
-        plan: &ConservativePlan,
-        fitted: Samples,
-        fresh: Samples,
-        cancel: &Cancel,
-    ) -> Result<Self, FieldError> {
-        check(plan, fitted)?;
-        check(plan, fresh)?;
-        plan.check_ranges()?;
-        plan.check_within(fitted)?;
-        plan.check_within(fresh)?;
-        let grids = plan.grids();
-        let rows = Rows::new(&grids, plan.kinds.len(), fitted.inputs);
-        let mut solved = Vec::with_capacity(BOUNDED);
-        let (leverage, units) = leverage(plan, fitted, cancel)?;
-        for k in 0..BOUNDED {
-            cancel.check()?;
-            solved.push(solve(&rows, &logs(fitted, &units, k))?);
-        }
-        let parts = ConservativeParts {
-            tables: bank(plan, grids, &solved),
-            leverage,
-            level: [solved[0].level, solved[1].level],
-            largest: plan.largest,
-            centre: plan.centre,
-            ranges: plan.ranges.iter().zip(&plan.kinds).map(limits).collect(),
-            looseness: [1.0; BOUNDED],
-        };
-        raised(parts, fitted, fresh)
-    }
-}
-
 fn check(plan: &ConservativePlan, samples: Samples) -> Result<(), FieldError> {
     let count = plan.kinds.len();
     if count == 0 {
@@ -133,6 +92,38 @@ fn check(plan: &ConservativePlan, samples: Samples) -> Result<(), FieldError> {
 }
 
 impl ConservativePlan {
+    /// Fits the tables to `fitted`, and raises them by what `fresh`, configurations of their own, shows.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`], [`FieldError::NotFinite`] where values are not positive or there are none,
+    /// [`FieldError::Ends`], [`FieldError::Range`] where samples lie beyond the ranges,
+    /// [`FieldError::NotPositiveDefinite`], or on request.
+    pub fn fit(&self, fitted: Samples, fresh: Samples, cancel: &Cancel) -> Result<Conservative, FieldError> {
+        check(self, fitted)?;
+        check(self, fresh)?;
+        self.check_ranges()?;
+        self.check_within(fitted)?;
+        self.check_within(fresh)?;
+        let grids = self.grids();
+        let rows = Rows::new(&grids, self.kinds.len(), fitted.inputs);
+        let mut solved = Vec::with_capacity(BOUNDED);
+        let (leverage, units) = leverage(self, fitted, cancel)?;
+        for k in 0..BOUNDED {
+            cancel.check()?;
+            solved.push(solve(&rows, &logs(fitted, &units, k))?);
+        }
+        let parts = ConservativeParts {
+            tables: bank(self, grids, &solved),
+            leverage,
+            level: [solved[0].level, solved[1].level],
+            largest: self.largest,
+            centre: self.centre,
+            ranges: self.ranges.iter().zip(&self.kinds).map(limits).collect(),
+            looseness: [1.0; BOUNDED],
+        };
+        raised(parts, fitted, fresh)
+    }
+
     fn check_ranges(&self) -> Result<(), FieldError> {
         for (input, &[low, high]) in self.ranges.iter().enumerate() {
             if !(low <= high && low.is_finite() && high.is_finite()) {
@@ -210,7 +201,7 @@ fn leverage(
     let Some(chain) = &plan.chain else { return Ok((None, vec![1.0; fitted.std.len()])) };
     let (position, width): (Vec<f64>, _) =
         (fitted.std.iter().copied().step_by(BOUNDED).collect(), plan.kinds.len());
-    let found = Leverage::fit(chain, plan.centre, (fitted.inputs, width), &position, cancel)?;
+    let found = fit_leverage(chain, plan.centre, (fitted.inputs, width), &position, cancel)?;
     let units = found.at(fitted.inputs, width).into_iter().flat_map(|unit| [unit, 1.0]).collect();
     Ok((Some(found), units))
 }
@@ -309,7 +300,7 @@ fn raised(mut parts: ConservativeParts, fitted: Samples, fresh: Samples) -> Resu
         parts.level[k] += raise;
         parts.looseness[k] = (raise - unseen[k][unseen[k].len() / 2]).exp();
     }
-    Conservative::new(parts)
+    Ok(Conservative::new(parts)?)
 }
 
 /// What sorted shortfalls exceed with the probability [`SELDOM`], and at least a little more than the largest.

@@ -4,14 +4,13 @@
 //! are one: what they are multiplied with must be zero there.
 
 use rayon::prelude::*;
+use truearm_bank::{Input, InputKind, Shape, alike};
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};
 
 use crate::columns::Columns;
 use crate::hyper::{Hyper, Product};
-use crate::kernel::{Input, InputKind, Shape};
 use crate::own::OwnKernel;
 use crate::pairs::{PairKernels, PairTable};
-use crate::sag::alike;
 use crate::training::Training;
 
 /// What kernels of one pose with the poses from it on are made of, computed once.

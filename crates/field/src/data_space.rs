@@ -8,11 +8,11 @@ use std::ops::Range;
 
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
+use truearm_bank::{Bank, Block};
 use truearm_estimate::dense::{Cholesky, parallelism, product, times};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Excited, Implied, Model};
 use crate::pairs::write_covariance;
 use crate::posterior::{LeaveOneOut, Query, Solution};

@@ -10,11 +10,10 @@
 //! and `log L = -1/2 (N log s^2 + 3 sum log(1 + v e))`.
 
 use faer::Mat;
+use truearm_bank::{Axis, CellKernel, Input, Shape};
 use truearm_estimate::dense::{Eigen, transposed_product};
 
 use crate::FieldError;
-use crate::cells::{Axis, CellKernel};
-use crate::kernel::{Input, Shape};
 use crate::unknowns::{NEGLIGIBLE, Root};
 
 /// How a set-up moved.

@@ -7,11 +7,9 @@
 use std::borrow::Cow;
 
 use faer::Mat;
+use truearm_bank::{Block, Grid, Input};
 use truearm_estimate::dense::inverse_of_square;
 
-use crate::bank::Block;
-use crate::cells::Grid;
-use crate::kernel::Input;
 use crate::model::BlockPlan;
 use crate::training::{Column, Training};
 

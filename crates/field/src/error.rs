@@ -1,7 +1,8 @@
 //! What can go wrong in fitting or evaluating a field.
 
+use truearm_bank::BankError;
 use truearm_estimate::EstimateError;
-use truearm_kinematics::KinematicsError;
+use truearm_kinematics::{Cancelled, KinematicsError};
 
 /// A field that could not be fitted or evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -75,15 +76,15 @@ pub enum FieldError {
         /// What is wrong.
         what: &'static str,
     },
-    /// A block that no fit makes, as a file that was changed may hold.
-    #[error("a block of the field is of no use: {what}; calibrate again")]
-    Block {
-        /// What is wrong.
-        what: &'static str,
-    },
     /// The constant stage failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// The bank refused what it was made of, or its input.
+    #[error(transparent)]
+    Bank(#[from] BankError),
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The chain refused its input.
     #[error(transparent)]
     Kinematics(#[from] KinematicsError),

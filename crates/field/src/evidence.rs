@@ -9,9 +9,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use faer::Mat;
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, add_to_lower, parallelism, times};
-use truearm_kinematics::{Isa, Kernel, dispatch};
+use truearm_kinematics::{Cancel, Isa, Kernel, dispatch};
 
 use crate::FieldError;
 use crate::columns::Columns;

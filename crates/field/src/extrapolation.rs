@@ -8,12 +8,12 @@
 
 use std::f64::consts::TAU;
 
-use truearm_estimate::Cancel;
+use truearm_bank::InputKind;
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::data_space::{DataSpace, LeftOut};
 use crate::hyper::Hyper;
-use crate::kernel::InputKind;
 use crate::model::Model;
 use crate::outliers::QUANTILE_95;
 use crate::training::Training;

@@ -1,15 +1,15 @@
 //! The variable calibration from start to end: linearise, choose, weigh, infer, judge outliers, relinearise.
 
-use truearm_estimate::{Cancel, ConstantFit, Layout, Point, Prior, Problem, Setup};
+use truearm_bank::{Bank, Input};
+use truearm_estimate::{ConstantFit, Layout, Point, Prior, Problem, Setup};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::bank::Bank;
 use crate::drives::Drives;
 use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
 use crate::hyper::{Hyper, Wave};
 use crate::joined::{Joined, join};
-use crate::kernel::Input;
 use crate::linear::{input_values, training};
 use crate::optimise::Limits;
 use crate::outliers::{self, Judgement};

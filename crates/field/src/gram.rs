@@ -8,8 +8,8 @@
 
 use faer::{Mat, MatRef, Par};
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::{add_product, add_to_lower, parallelism};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::pairs::by_pose;

@@ -5,8 +5,8 @@
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::Cholesky;
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 

@@ -4,8 +4,7 @@
 //! measurable at four hundred (docs/decisions/0003). What they do not repeat is each one's own, about a level that they share
 //! (docs/decisions/0040). Each has a wide log-normal prior centred on its start, amplitudes about a factor that they share.
 
-use crate::kernel::{Input, InputKind};
-use crate::sag::UPRIGHT;
+use truearm_bank::{Input, InputKind, UPRIGHT};
 
 /// A block that varies with several joints together.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +29,7 @@ pub struct Wave {
     /// Its phase by the joint's value: cycles a turn; where the joint slides, rad/m.
     pub cycles: f64,
     /// Prior standard deviation of the weights of its cosine and its sine, rad (prismatic: times
-    /// [`truearm_estimate::ANGLE_ARM`] m).
+    /// [`truearm_kinematics::ANGLE_ARM`] m).
     pub amplitude: f64,
 }
 
@@ -39,7 +38,7 @@ pub struct Wave {
 pub struct Hyper {
     /// Factors on the constants' prior standard deviations by class (theta, other angles, lengths).
     pub constant: [f64; 3],
-    /// Amplitude of `own` blocks, rad (for prismatic joints times [`truearm_estimate::ANGLE_ARM`] m).
+    /// Amplitude of `own` blocks, rad (for prismatic joints times [`truearm_kinematics::ANGLE_ARM`] m).
     pub own: f64,
     /// Length scale of `own` blocks.
     pub own_length: f64,
@@ -51,11 +50,11 @@ pub struct Hyper {
     pub smooth_length: f64,
     /// The same over slides and features, in parts of their range over pi: what rails do has nothing to do with turns.
     pub smooth_line_length: f64,
-    /// What joints miss anew at every pose, rad (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
+    /// What joints miss anew at every pose, rad (prismatic: times [`truearm_kinematics::ANGLE_ARM`] m).
     pub repeatability: f64,
     /// Factor of each joint on it, (N,).
     pub unevenness: Vec<f64>,
-    /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
+    /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`truearm_kinematics::ANGLE_ARM`] m).
     pub sag: f64,
     /// The direction, in the base frame, against which `sag` takes links to weigh.
     pub up: [f64; 3],

@@ -1,9 +1,9 @@
 //! What hyper-parameters of an arm may be: a file may say anything.
 
+use truearm_bank::{Input, MOST_AXES};
+
 use crate::FieldError;
-use crate::cells::MOST_AXES;
 use crate::hyper::Hyper;
-use crate::kernel::Input;
 
 /// Beyond, a file holds no hyper-parameters of an arm.
 const MOST_WAVES: usize = 100;

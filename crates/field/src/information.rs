@@ -8,6 +8,7 @@
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use truearm_bank::InputKind;
 use truearm_estimate::dense::{Cholesky, add_product, product, symmetric_product, transposed_product};
 
 use crate::continuous::{Continuous, Pairing, exponent_factors};
@@ -15,7 +16,6 @@ use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
     AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
-use crate::kernel::InputKind;
 use crate::pairs::ByColumn;
 use crate::training::{Class, Training};
 

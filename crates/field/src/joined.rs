@@ -6,8 +6,8 @@
 //! pose and s of a shot, and that of their differences, which knows s alone and is left out here.
 
 use std::collections::VecDeque;
+use truearm_bank::Input;
 
-use crate::kernel::Input;
 use crate::outliers::chi_squared;
 use crate::training::Training;
 

@@ -1,5 +1,5 @@
-//! Error parameters that vary with the configuration: a bank of fuzzy association cells (FCMAC blocks) whose
-//! weights are inferred from the measurements themselves.
+//! Finding error parameters that vary with the configuration: the weights of a bank of fuzzy association cells (FCMAC
+//! blocks, `truearm_bank`) are inferred from the measurements themselves.
 //!
 //! A measured residual is `r = J(q) CEP(q) + noise` with `CEP(q)` the sum of blocks, each a grid of cells over a
 //! few inputs whose B-spline memberships weigh the cells' CEPs. Each block's weights have a Gaussian prior
@@ -15,15 +15,9 @@
 extern crate self as truearm_field;
 
 mod ascent;
-mod bank;
-mod cells;
 pub mod cmac;
 mod columns;
 mod compass;
-mod compiled;
-mod compiled_axis;
-mod compiled_table;
-mod conservative;
 mod conservative_fit;
 mod continuous;
 mod data_space;
@@ -40,8 +34,7 @@ mod hyper_check;
 mod hyper_prior;
 mod information;
 mod joined;
-mod kernel;
-mod leverage;
+mod leverage_fit;
 mod linear;
 mod model;
 mod optimise;
@@ -53,9 +46,7 @@ mod predict;
 mod projection;
 mod refine;
 pub mod regions;
-mod sag;
 mod select;
-mod spline;
 #[cfg(test)]
 mod tests;
 mod training;
@@ -66,10 +57,6 @@ mod weight_rows;
 mod weight_space;
 mod widening;
 
-pub use bank::{Bank, Block};
-pub use cells::{Axis, Grid, StoredAxis};
-pub use compiled::{Compiled, FieldScratch};
-pub use conservative::{BOUNDED, Conservative, ConservativeParts, ConservativeScratch};
 pub use conservative_fit::{ConservativePlan, Samples};
 pub use drift::{Drift, Left, find_drift};
 pub use drives::Drives;
@@ -78,11 +65,9 @@ pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME, Wave};
 pub use joined::shots_of_poses;
-pub use kernel::{Input, InputKind};
-pub use leverage::{FACTOR_COLUMNS, Leverage, MOVED, moved_with_setup};
+pub use leverage_fit::fit_leverage;
 pub use outliers::{Judgement, QUANTILE_95};
 pub use own::UNRIPPLED;
 pub use posterior::Posterior;
 pub use predict::measurement_covariance;
-pub use sag::{Levers, Sag, SagScratch, UPRIGHT};
 pub use training::{Class, Column, Training};

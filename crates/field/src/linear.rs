@@ -1,12 +1,10 @@
 //! From measurements to rows that a field is inferred from.
 
+use truearm_bank::{Input, Levers, range};
 use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_precision};
 
 use crate::FieldError;
-use crate::cells::range;
 use crate::fit::FieldOptions;
-use crate::kernel::Input;
-use crate::sag::Levers;
 use crate::training::{Column, Training};
 
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.

@@ -1,11 +1,10 @@
 //! The prior model of one training set: cells, what they drive, and how alike configurations are under it.
 
-use crate::cells::{Active, Axis, CellKernel, Grid};
+use truearm_bank::{Active, Axis, CellKernel, Grid, Levers, Sag, Shape, alike};
+
 use crate::hyper::{Hyper, Product, WAVE_NAME, Wave};
-use crate::kernel::Shape;
 use crate::own::OwnKernel;
 use crate::pairs::{ByColumn, PairKernels, PairTable};
-use crate::sag::{Levers, Sag, alike};
 use crate::training::{Class, Training};
 
 /// Cells per length scale: `own` curves have a rougher kernel and cost little.

@@ -211,9 +211,9 @@ impl Inverse {
 
 #[cfg(test)]
 mod tests {
-    use truearm_estimate::EstimateError;
 
     use super::*;
+    use truearm_kinematics::Cancelled;
 
     fn ranges(high: f64) -> Vec<Range> {
         vec![Range { start: 1.0, low: 1e-3, high, spread: f64::INFINITY }; 4]
@@ -280,11 +280,11 @@ mod tests {
         let mut left = 5;
         let stops = |point: &[f64]| {
             left -= 1;
-            if left == 0 { Err(FieldError::Estimate(EstimateError::Cancelled)) } else { valley(point) }
+            if left == 0 { Err(FieldError::Cancelled(Cancelled)) } else { valley(point) }
         };
         let limits = Limits { evaluations: 200, gain: 1e-12 };
         let stopped = maximise(stops, &[0.0; 4], &ranges(1e3), limits).unwrap_err();
-        assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
+        assert_eq!(stopped, FieldError::Cancelled(Cancelled));
         assert_eq!(left, 0, "nothing is evaluated after the request");
     }
 

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use faer::Mat;
-use truearm_estimate::Cancel;
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::posterior::{Posterior, Solution, standardised};

@@ -5,10 +5,10 @@
 //! the neighbours, which keeps it positive definite on the circle. Where cycles times length scale are far below one it is as good as
 //! the Matern kernel alone.
 
+use truearm_bank::{InputKind, Shape};
 use truearm_kinematics::{Isa, Kernel, Lane, dispatch};
 
 use crate::hyper::Hyper;
-use crate::kernel::{InputKind, Shape};
 
 /// Cycles a turn at which nothing ripples.
 pub const UNRIPPLED: f64 = 0.0;
@@ -89,7 +89,7 @@ impl Kernel for Of {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::Input;
+    use truearm_bank::Input;
     use truearm_estimate::dense::Cholesky;
 
     const CYCLES: [f64; 6] = [0.0, 0.4, 1.0, 3.7, 12.0, 31.6];

@@ -9,12 +9,11 @@
 use faer::prelude::ReborrowMut;
 use faer::{ColRef, MatMut};
 use rayon::prelude::*;
-use truearm_estimate::ANGLE_ARM;
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+use truearm_bank::InputKind;
+use truearm_kinematics::{ANGLE_ARM, Isa, Kernel, LANES, Lane, dispatch};
 
 use crate::columns::Columns;
 use crate::hyper::Hyper;
-use crate::kernel::InputKind;
 use crate::training::{Class, Training};
 
 /// Kernels between one pose and all poses from it on (or all of another set), each (count,) long.

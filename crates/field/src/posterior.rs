@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
+use truearm_bank::Bank;
 use truearm_estimate::dense::{Cholesky, column, to_vec};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::bank::Bank;
 use crate::data_space::DataSpace;
 use crate::drives::Drives;
 use crate::hyper::Hyper;

@@ -4,8 +4,8 @@
 //! `P = K^-1 - K^-1 S (S^T K^-1 S)^-1 S^T K^-1` (Patterson and Thompson 1971).
 
 use faer::{Mat, MatRef};
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::training::Training;

@@ -1,9 +1,9 @@
 //! From the linear solution to the exact model's.
 
+use truearm_bank::Bank;
 use truearm_estimate::{Layout, Point, Problem, Setup, residuals};
 
 use crate::FieldError;
-use crate::bank::Bank;
 use crate::posterior::{Posterior, Solution};
 use crate::training::Training;
 

@@ -6,13 +6,13 @@
 //! long one may still carry a first harmonic. It is the best of dozens of choices, and so has to be far ahead
 //! (docs/decisions/0004). A joint must bring [`WORTH`] nats to stay; two stay always.
 
-use truearm_estimate::Cancel;
+use truearm_bank::InputKind;
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::ascent::climb;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
-use crate::kernel::InputKind;
 use crate::optimise::Limits;
 use crate::training::Training;
 

@@ -1,12 +1,11 @@
 //! Linearised measurements that a field is inferred from.
 
-use truearm_estimate::Cancel;
+use truearm_bank::{Input, Levers};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::drives::Drives;
 use crate::hyper::Hyper;
-use crate::kernel::Input;
-use crate::sag::Levers;
 
 /// Poses that are chosen between two looks at whether the work was cancelled.
 const BETWEEN_LOOKS: usize = 16;

@@ -1,9 +1,9 @@
 //! The unknowns of weight space: constants, set-up, `sag`, then block by block the eigenvectors of the cells' priors that matter.
 
 use faer::Mat;
+use truearm_bank::CellKernel;
 use truearm_estimate::dense::Eigen;
 
-use crate::cells::CellKernel;
 use crate::model::{BlockPlan, Model};
 
 /// Eigenvalues below this share of the largest are left out, where noise hides what they stand for.
@@ -133,8 +133,7 @@ pub fn size(model: &Model) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cells::Axis;
-    use crate::kernel::{Input, Shape};
+    use truearm_bank::{Axis, Input, Shape};
 
     /// E of a whole turn with such a length scale.
     fn root(length: f64) -> Root {

@@ -3,13 +3,13 @@
 //! An arm on a wall whose file does not say so would have levers of the wrong heights. Which of two opposite directions is
 //! up does not matter: weights of the `sag` block have either sign.
 
-use truearm_estimate::Cancel;
+use truearm_bank::UPRIGHT;
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::optimise::Limits;
-use crate::sag::UPRIGHT;
 use crate::select::{Found, refine};
 use crate::training::Training;
 

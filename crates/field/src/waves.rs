@@ -14,13 +14,12 @@
 use std::f64::consts::TAU;
 
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
+use truearm_bank::{InputKind, range};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::cells::range;
 use crate::evidence::Evidence;
 use crate::hyper::{Hyper, Wave};
-use crate::kernel::InputKind;
 use crate::pairs::ByColumn;
 use crate::training::Training;
 
@@ -252,7 +251,7 @@ impl Sums {
         self.information[2] += s * s;
     }
 
-    /// `I^-1 z`: the weights of cosine and sine, rad (of a joint that slides times [`truearm_estimate::ANGLE_ARM`] m); zero where the poses cannot tell one from the other.
+    /// `I^-1 z`: the weights of cosine and sine, rad (of a joint that slides times [`truearm_kinematics::ANGLE_ARM`] m); zero where the poses cannot tell one from the other.
     fn weights(&self) -> [f64; 2] {
         let ([c, s], [cc, cs, ss]) = (self.score, self.information);
         let determinant = cc * ss - cs * cs;

@@ -5,8 +5,8 @@ use std::ops::Range;
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, mirror_lower, to_vec};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::model::{BlockPlan, Model};

@@ -8,11 +8,11 @@
 use std::ops::Range;
 
 use faer::{Mat, MatRef};
-use truearm_estimate::Cancel;
+use truearm_bank::{Bank, Block};
 use truearm_estimate::dense::{Cholesky, column, parallelism, product, times, to_vec};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::bank::{Bank, Block};
 use crate::gram::add_gram;
 use crate::model::{BlockPlan, Model};
 use crate::outliers::SUSPICIOUS;

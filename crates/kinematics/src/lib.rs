@@ -9,6 +9,7 @@
 
 mod batch;
 mod bend;
+mod cancel;
 mod chain;
 mod error;
 mod exponential;
@@ -31,6 +32,7 @@ mod x86;
 
 pub use batch::Batch;
 pub use bend::{Bent, bend};
+pub use cancel::{Cancel, Cancelled};
 pub use chain::{Chain, Convention, Joint, Link};
 pub use error::KinematicsError;
 pub use exponential::exp;
@@ -39,7 +41,7 @@ pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
 pub use lane::{LANES, Lane, Pick, Short};
 pub use levers::{BESIDE, LeverScratch, lever_count};
 pub use one_pose::OnePose;
-pub use parameters::{LaneParameters, Parameters, SharedParameters, is_length};
+pub use parameters::{ANGLE_ARM, LaneParameters, Parameters, SharedParameters, is_length};
 pub use rows::{lane_room, load_lanes, store_lanes};
 pub use sweep::Screw;
 pub use transform::{Transform, rotation_exp, rotation_log};

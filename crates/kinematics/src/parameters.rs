@@ -6,6 +6,9 @@ use crate::lane::Lane;
 use crate::one_pose::OnePose;
 use crate::trig::sin_cos;
 
+/// Metres that a radian counts, in errors and in changes of parameters and joints: half the length of a lower arm.
+pub const ANGLE_ARM: f64 = 0.3;
+
 /// Whether the parameter with index 5 * link + (theta, d, a, alpha, beta) is a length, m, and no angle, rad.
 #[inline(always)]
 pub const fn is_length(column: usize) -> bool {

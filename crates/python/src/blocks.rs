@@ -4,7 +4,7 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truearm_field::{Axis, Block, Grid, Sag, StoredAxis};
+use truearm_bank::{Axis, Block, Grid, Sag, StoredAxis};
 
 use crate::measured::matrix;
 

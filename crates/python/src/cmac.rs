@@ -5,12 +5,12 @@ use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use truearm_estimate::Cancel;
 use truearm_field::FieldError;
 use truearm_field::cmac::{
     Composition, FitOptions, Membership, Network as Core, NetworkFit as CoreFit, NetworkOptions, Rate, Rows,
     Scales, Sensor, Trained, TrainingEnd, TrainingOptions,
 };
+use truearm_kinematics::Cancel;
 
 use crate::chain::{contiguous, not_contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};

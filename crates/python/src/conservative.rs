@@ -3,10 +3,10 @@
 use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truearm_field::{
-    BOUNDED, Bank, Conservative as Core, ConservativeParts, ConservativePlan, FACTOR_COLUMNS, InputKind,
-    Leverage, Samples,
+use truearm_bank::{
+    BOUNDED, Bank, Conservative as Core, ConservativeParts, FACTOR_COLUMNS, InputKind, Leverage,
 };
+use truearm_field::{ConservativePlan, Samples};
 
 use crate::blocks::{block_from, block_into};
 use crate::chain::Chain;
@@ -105,7 +105,7 @@ impl Conservative {
         let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(numbers);
         let core = long(py, |cancel| {
             let samples = |k: usize| Samples { inputs: &arrays[k], std: &arrays[k + 1] };
-            Core::fit(&plan, samples(0), samples(2), cancel)
+            plan.fit(samples(0), samples(2), cancel)
         })?;
         Ok(Self { core })
     }

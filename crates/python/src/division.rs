@@ -4,12 +4,13 @@ use numpy::{
     PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use truearm_estimate::{Cancel, MeasurementSet as CoreSet};
+use truearm_estimate::MeasurementSet as CoreSet;
 use truearm_field::FieldError;
 use truearm_field::regions::{
     Active, Arm, Candidates, Division as Core, DivisionOptions, Halving, Order, PoseOptions, Recorded,
     Workspace, divide as divide_source,
 };
+use truearm_kinematics::Cancel;
 
 use crate::chain::Chain;
 use crate::choice::criterion;

@@ -13,12 +13,13 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use truearm_bank::BankError;
 use truearm_clearance::ClearanceError;
 use truearm_compensate::CompensateError;
-use truearm_estimate::{Cancel, EstimateError};
+use truearm_estimate::EstimateError;
 use truearm_field::FieldError;
 use truearm_inverse::InverseError;
-use truearm_kinematics::{InstructionSet, KinematicsError};
+use truearm_kinematics::{Cancel, InstructionSet, KinematicsError};
 use truearm_text::TextError;
 
 create_exception!(
@@ -48,6 +49,7 @@ trait Worded: Display {}
 
 impl Worded for KinematicsError {}
 impl Worded for EstimateError {}
+impl Worded for BankError {}
 impl Worded for FieldError {}
 impl Worded for CompensateError {}
 impl Worded for InverseError {}

@@ -11,11 +11,13 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truearm_estimate::{Cancel, Point};
+use truearm_bank::{Bank, Compiled, Input, Levers, UPRIGHT};
+use truearm_estimate::Point;
 use truearm_field::{
-    Bank, Compiled, Drives, FieldError, FieldFit as CoreFit, FieldOptions, Input, Levers,
-    Posterior as CorePosterior, UPRIGHT, fit_field as fit, measurement_covariance, restore,
+    Drives, FieldError, FieldFit as CoreFit, FieldOptions, Posterior as CorePosterior, fit_field as fit,
+    measurement_covariance, restore,
 };
+use truearm_kinematics::Cancel;
 
 use crate::asked::{Asked, Copies};
 use crate::blocks::{block_from, block_into, sag_into, up_of};

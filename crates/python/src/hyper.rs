@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use pyo3::prelude::*;
-use truearm_field::{Hyper, MAJOR_NAME, Product, UNRIPPLED, UPRIGHT, WRIST_NAME, Wave};
+use truearm_bank::UPRIGHT;
+use truearm_field::{Hyper, MAJOR_NAME, Product, UNRIPPLED, WRIST_NAME, Wave};
 
 use crate::door::CoreError;
 

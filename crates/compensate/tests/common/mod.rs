@@ -4,8 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
+use truearm_bank::{Axis, Bank, Block, Grid, Input};
 use truearm_compensate::{Corrector, Limits, Model, NUMBERS, Options, Path, Refusal, Run};
-use truearm_field::{Axis, Bank, Block, Grid, Input};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Parameters, Transform};
 
 /// A repeatable stream of numbers between -1 and 1 (an additive recurrence, well spread).

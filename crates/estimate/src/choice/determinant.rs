@@ -5,7 +5,9 @@ use faer::{Mat, Par};
 
 use crate::choice::pool::Pool;
 use crate::dense::Cholesky;
-use crate::{Cancel, EstimateError};
+use truearm_kinematics::Cancel;
+
+use crate::EstimateError;
 
 /// Share of the mean diagonal entry that is added to M^t M so that a few poses have an inverse at all.
 const RIDGE: f64 = 1e-7;

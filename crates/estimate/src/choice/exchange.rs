@@ -8,7 +8,9 @@ use crate::choice::pool::Pool;
 use crate::choice::spectral;
 use crate::dense::transposed_product;
 use crate::scale::scaled_jacobian;
-use crate::{Cancel, EstimateError};
+use truearm_kinematics::Cancel;
+
+use crate::EstimateError;
 
 /// What is chosen, and by what.
 #[derive(Debug, Clone)]

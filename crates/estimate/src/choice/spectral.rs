@@ -9,7 +9,9 @@ use faer::Mat;
 use crate::choice::observability::Criterion;
 use crate::choice::pool::Pool;
 use crate::dense::{Eigen, add_product, eigenvalues};
-use crate::{Cancel, EstimateError};
+use truearm_kinematics::Cancel;
+
+use crate::EstimateError;
 
 /// Candidates that are tried for each pose that may leave.
 const TRIED: usize = 32;

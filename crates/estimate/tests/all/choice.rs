@@ -3,8 +3,9 @@
 
 use crate::common::stream::Stream;
 use truearm_estimate::{
-    Cancel, Choice, ChoiceOptions, Criterion, EstimateError, Observability, choose_poses, observability_of,
+    Choice, ChoiceOptions, Criterion, EstimateError, Observability, choose_poses, observability_of,
 };
+use truearm_kinematics::{Cancel, Cancelled};
 
 const COLUMNS: [usize; 5] = [0, 1, 2, 3, 4];
 const ALL: [Criterion; 7] = [
@@ -182,5 +183,5 @@ fn bad_input_is_refused_with_its_value() {
     let cancel = Cancel::default();
     cancel.request();
     let how = ChoiceOptions { cancel, ..options(2, Criterion::O1) };
-    assert_eq!(choose_poses(&jacobian, 3, &how).unwrap_err(), EstimateError::Cancelled);
+    assert_eq!(choose_poses(&jacobian, 3, &how).unwrap_err(), EstimateError::Cancelled(Cancelled));
 }

@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use faer::{Mat, Par};
-use truearm_estimate::dense::Cholesky;
-use truearm_estimate::{Cancel, EstimateError};
+use truearm_estimate::{EstimateError, dense::Cholesky};
+use truearm_kinematics::{Cancel, Cancelled};
 
 /// A positive definite matrix whose rows differ.
 fn matrix(n: usize) -> Mat<f64> {
@@ -65,7 +65,7 @@ fn a_request_to_stop_is_heeded() {
     let factor = Cholesky::heeding(matrix(30), Par::Seq, &cancel).unwrap().unwrap();
     cancel.request();
     let stopped = Cholesky::heeding(matrix(30), Par::Seq, &cancel);
-    assert!(matches!(stopped, Err(EstimateError::Cancelled)));
+    assert!(matches!(stopped, Err(EstimateError::Cancelled(Cancelled))));
     let stopped = factor.inverse_blocks(&[0..3, 3..6], &cancel);
-    assert!(matches!(stopped, Err(EstimateError::Cancelled)));
+    assert!(matches!(stopped, Err(EstimateError::Cancelled(Cancelled))));
 }

@@ -7,9 +7,10 @@ use crate::common::arms::{ur10, ur10_columns, ur10_determined};
 use crate::common::root_mean_square;
 use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{
-    Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior,
-    Problem, Setup, fit_constant, identifiability, linearise, residuals, setup_precision,
+    ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior, Problem,
+    Setup, fit_constant, identifiability, linearise, residuals, setup_precision,
 };
+use truearm_kinematics::{Cancel, Cancelled};
 
 fn plan() -> Plan {
     Plan { noise: (1e-4, 0.0), ..Plan::new(ur10(), ur10_determined(), 40) }
@@ -240,10 +241,10 @@ fn a_request_to_stop_is_obeyed() {
     let scene = plan().make();
     let options = ConstantOptions::default();
     options.cancel.clone().request();
-    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled);
+    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled(Cancelled));
     let flag = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
     let options = ConstantOptions { cancel: Cancel::from_flag(flag.clone()), ..ConstantOptions::default() };
-    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled);
+    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled(Cancelled));
     flag.store(false, std::sync::atomic::Ordering::Relaxed);
     assert!(fit_constant(&scene.problem(), &options).is_ok());
 }

@@ -7,7 +7,8 @@
 
 use faer::Mat;
 use truearm_estimate::dense::{Cholesky, parallelism, product, times};
-use truearm_estimate::{Cancel, EstimateError, column_unit};
+use truearm_estimate::{EstimateError, column_unit};
+use truearm_kinematics::Cancel;
 
 use crate::FieldError;
 use crate::cmac::gain::Rows;

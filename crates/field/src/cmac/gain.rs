@@ -1,8 +1,7 @@
 //! Linearised measurements as patterns: a residual asks for the smallest change of CEPs that explains it.
 
 use faer::{Mat, Par};
-use truearm_estimate::dense::Cholesky;
-use truearm_estimate::{EstimateError, column_unit, row_unit, scaled_jacobian};
+use truearm_estimate::{EstimateError, column_unit, dense::Cholesky, row_unit, scaled_jacobian};
 use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::cmac::network::Network;

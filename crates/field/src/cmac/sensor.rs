@@ -1,9 +1,8 @@
 //! One input's sensor: cells at equal distances, and how strongly a value excites the nearest of them.
 
+use truearm_bank::{cubic, linear, quadratic};
 use truearm_estimate::EstimateError;
 use truearm_kinematics::{Isa, LANES, Lane, exp};
-
-use crate::spline::{cubic, linear, quadratic};
 
 /// Cells of a sensor that may be active at once.
 pub const MOST_ACTIVE: usize = 8;

@@ -1,7 +1,7 @@
 //! Training by the paper's rule (A5), pattern after pattern, until all differences are within the tolerance.
 
-use truearm_estimate::{Cancel, EstimateError, column_unit};
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+use truearm_estimate::{EstimateError, column_unit};
+use truearm_kinematics::{Cancel, Isa, Kernel, LANES, Lane, dispatch};
 
 use crate::cmac::network::Network;
 

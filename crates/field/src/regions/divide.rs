@@ -4,8 +4,8 @@
 //! compensation leaves too; a region whose halves could not be well conditioned stays whole, so that none is
 //! estimated from ill-conditioned poses; a half that cannot be reached stays without CEPs.
 
-use truearm_estimate::{Cancel, EstimateError, FrameMode, MeasurementSet, Problem, Setup};
-use truearm_kinematics::Chain;
+use truearm_estimate::{EstimateError, FrameMode, MeasurementSet, Problem, Setup};
+use truearm_kinematics::{Cancel, Chain};
 
 use crate::FieldError;
 use crate::regions::estimate::Held;

@@ -1,11 +1,10 @@
 //! Passive mode: a region's measurements are those of a data set that lie in it.
 
-use truearm_estimate::{MeasurementSet, Problem, observability};
+use truearm_estimate::{MeasurementSet, Problem, Setup, observability};
 
 use crate::FieldError;
 use crate::regions::estimate::{Held, scaled};
 use crate::regions::source::{Prepared, Rows, Source, Verdict};
-use truearm_estimate::Setup;
 
 /// A data set with features, some rows of which judge and take no part in any fit.
 pub struct Recorded<'a> {

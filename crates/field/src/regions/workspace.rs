@@ -1,10 +1,10 @@
 //! Active mode: poses are chosen in the region and measured on demand.
 
 use truearm_estimate::{
-    Cancel, ChoiceOptions, Criterion, EstimateError, FrameMode, MeasurementSet, Point, Problem, Setup,
-    choose_poses, linearise,
+    ChoiceOptions, Criterion, EstimateError, FrameMode, MeasurementSet, Point, Problem, Setup, choose_poses,
+    linearise,
 };
-use truearm_kinematics::Chain;
+use truearm_kinematics::{Cancel, Chain};
 
 use crate::FieldError;
 use crate::regions::source::{Prepared, Rows, Source, Verdict};

@@ -2,7 +2,7 @@
 
 use faer::{Mat, Par};
 use truearm_estimate::dense::{Cholesky, column};
-use truearm_estimate::{Cancel, EstimateError};
+use truearm_kinematics::{Cancel, Cancelled, lever_count};
 
 use super::oracle::{Exact, Oracle};
 use super::sets::{
@@ -13,7 +13,6 @@ use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::hyper_prior::HyperPrior;
 use crate::training::Training;
-use truearm_kinematics::lever_count;
 
 /// Every derivative against central differences of fourth order. The step is long because an undetermined set-up
 /// direction (a SCARA's height) leaves the value seven digits.
@@ -206,5 +205,5 @@ fn a_request_to_stop_is_obeyed() {
     let evidence = Evidence::new(&training, &cancel);
     cancel.request();
     let stopped = evidence.score(&hyper(&training, 6)).unwrap_err();
-    assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
+    assert_eq!(stopped, FieldError::Cancelled(Cancelled));
 }

@@ -1,8 +1,8 @@
 //! Sums by pairs of parameters against the product of the rows themselves.
 
 use faer::Mat;
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::product;
+use truearm_kinematics::Cancel;
 
 use super::posterior::sets;
 use super::sets::long;

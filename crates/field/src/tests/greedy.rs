@@ -1,7 +1,7 @@
 //! Choosing by rank updates against posteriors that are inferred anew.
 
 use proptest::prelude::*;
-use truearm_estimate::Cancel;
+use truearm_kinematics::Cancel;
 
 use super::posterior::{close, own_columns, queries, sets, space_without, spaces};
 use crate::greedy::{Candidates, Greedy, choose_informative, choose_telling};

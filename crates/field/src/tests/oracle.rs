@@ -3,13 +3,12 @@
 use std::f64::consts::TAU;
 
 use faer::{Mat, Par};
-use truearm_estimate::ANGLE_ARM;
+use truearm_bank::{CellKernel, InputKind};
 use truearm_estimate::dense::{Cholesky, column};
+use truearm_kinematics::ANGLE_ARM;
 
-use crate::cells::CellKernel;
 use crate::hyper::Hyper;
 use crate::hyper_prior::HyperPrior;
-use crate::kernel::InputKind;
 use crate::model::Model;
 use crate::training::{Class, Training};
 

@@ -1,6 +1,6 @@
 //! Data space and weight space against the dense computation with the kernels that their cells imply.
 
-use truearm_estimate::Cancel;
+use truearm_kinematics::Cancel;
 
 use super::common::Random;
 use super::oracle::{OfCells, Oracle, dot, squared};

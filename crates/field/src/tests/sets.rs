@@ -1,5 +1,6 @@
 //! Small training sets and hyper-parameters at which nothing is negligible.
 
+use truearm_bank::Input;
 use truearm_estimate::{MeasurementSet, Point, Setup};
 
 use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
@@ -7,7 +8,6 @@ use crate::drives::Drives;
 use crate::fit::FieldOptions;
 use crate::hyper::{Hyper, Wave};
 use crate::joined::join;
-use crate::kernel::Input;
 use crate::linear::training;
 use crate::training::Training;
 

@@ -1,8 +1,8 @@
 //! What a posterior must be wherever it is asked: positive semidefinite, surer among the data than away from it, back at
 //! the constants far away; and the choice between the spaces.
 
-use truearm_estimate::Cancel;
 use truearm_estimate::dense::eigenvalues;
+use truearm_kinematics::Cancel;
 
 use super::common::{Measure, Truth, scara};
 use super::posterior::close;

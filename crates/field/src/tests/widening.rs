@@ -1,6 +1,6 @@
 //! Amplitudes that the evidence leaves open widen standard deviations, others do not.
 
-use truearm_estimate::Cancel;
+use truearm_kinematics::Cancel;
 
 use super::common::{Measure, Truth, options, problem, six_axes};
 use super::sets::{few_driven, hyper, positions};

@@ -2,11 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use crate::common::Random;
-use truearm_estimate::{Cancel, EstimateError};
-use truearm_field::{
-    Conservative, ConservativePlan, FACTOR_COLUMNS, FieldError, InputKind, Leverage, MOVED, Samples,
-};
-use truearm_kinematics::{Chain, Convention, Joint, Link, Parameters, Transform};
+use truearm_bank::{BankError, Conservative, FACTOR_COLUMNS, InputKind, Leverage, MOVED};
+use truearm_field::{ConservativePlan, FieldError, Samples, fit_leverage};
+use truearm_kinematics::{Cancel, Cancelled, Chain, Convention, Joint, Link, Parameters, Transform};
 
 const JOINTS: usize = 4;
 const RANGES: [[f64; 2]; JOINTS] = [[-6.3, 6.3], [-2.0, 1.0], [-2.5, 2.5], [0.1, 0.6]];
@@ -56,7 +54,7 @@ fn plan() -> ConservativePlan {
 
 fn fitted() -> Conservative {
     let (fitted, fresh) = (Drawn::new(3000, 1), Drawn::new(3000, 2));
-    Conservative::fit(&plan(), fitted.samples(), fresh.samples(), &Cancel::default()).unwrap()
+    plan().fit(fitted.samples(), fresh.samples(), &Cancel::default()).unwrap()
 }
 
 fn ratios(field: &Conservative, drawn: &Drawn, k: usize) -> Vec<f64> {
@@ -124,20 +122,20 @@ fn stored_parts_are_the_same_field() {
     assert_eq!(Conservative::new(field.parts().clone()).unwrap(), field);
     let mut parts = field.parts().clone();
     parts.level[1] = f64::NAN;
-    assert!(matches!(Conservative::new(parts), Err(FieldError::NotFinite { .. })));
+    assert!(matches!(Conservative::new(parts), Err(BankError::NotFinite { .. })));
     let mut parts = field.parts().clone();
     parts.ranges.pop();
-    assert!(matches!(Conservative::new(parts), Err(FieldError::Length { .. })));
+    assert!(matches!(Conservative::new(parts), Err(BankError::Length { .. })));
 }
 
 #[test]
 fn samples_that_are_no_standard_deviations_are_refused() {
     let (good, mut bad) = (Drawn::new(50, 1), Drawn::new(50, 2));
     bad.std[7] = 0.0;
-    let refused = Conservative::fit(&plan(), good.samples(), bad.samples(), &Cancel::default());
+    let refused = plan().fit(good.samples(), bad.samples(), &Cancel::default());
     assert!(matches!(refused, Err(FieldError::NotFinite { .. })));
     bad.std.pop();
-    let refused = Conservative::fit(&plan(), bad.samples(), good.samples(), &Cancel::default());
+    let refused = plan().fit(bad.samples(), good.samples(), &Cancel::default());
     assert!(matches!(refused, Err(FieldError::Length { .. })));
 }
 
@@ -181,7 +179,7 @@ fn a_leverage_follows_what_constants_leave_where_tables_cannot() {
     });
     let median = |chain| {
         let plan = ConservativePlan { chain, largest: [1.0; 2], together: Vec::new(), ..plan() };
-        let found = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default()).unwrap();
+        let found = plan.fit(fitted.samples(), fresh.samples(), &Cancel::default()).unwrap();
         let ratios = ratios(&found, &drawn, 0);
         assert!(ratios[0] >= 1.0, "{}", ratios[0]);
         assert_eq!(found.std(&drawn.inputs[..JOINTS]).unwrap(), found.std(&drawn.inputs).unwrap()[..2]);
@@ -197,7 +195,7 @@ fn a_leverage_is_the_same_however_many_threads_and_once_stored() {
     let std: Vec<f64> = of_constants(&inputs).into_iter().step_by(2).collect();
     let by = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Leverage::fit(&chain(), centre, (&inputs, JOINTS), &std, &Cancel::default())).unwrap()
+        pool.install(|| fit_leverage(&chain(), centre, (&inputs, JOINTS), &std, &Cancel::default())).unwrap()
     };
     let found = by(1);
     assert_eq!(found, by(3));
@@ -205,8 +203,8 @@ fn a_leverage_is_the_same_however_many_threads_and_once_stored() {
     let mut spoilt = found.factor();
     spoilt[3] = f64::NAN;
     let error = Leverage::new(&chain(), centre, &spoilt).unwrap_err();
-    assert_eq!(error, FieldError::NotFinite { what: "factor of the standard deviation" });
-    assert!(matches!(Leverage::new(&chain(), centre, &spoilt[8..]), Err(FieldError::Length { .. })));
+    assert_eq!(error, BankError::NotFinite { what: "factor of the standard deviation" });
+    assert!(matches!(Leverage::new(&chain(), centre, &spoilt[8..]), Err(BankError::Length { .. })));
 }
 
 #[test]
@@ -214,10 +212,7 @@ fn ranges_and_samples_that_do_not_fit_are_refused() {
     let (fitted, fresh) = (Drawn::new(300, 1), Drawn::new(300, 2));
     let refusal = |ranges: Vec<[f64; 2]>| {
         let plan = ConservativePlan { ranges, ..plan() };
-        Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default())
-            .map(drop)
-            .unwrap_err()
-            .to_string()
+        plan.fit(fitted.samples(), fresh.samples(), &Cancel::default()).map(drop).unwrap_err().to_string()
     };
     for wrong in [[1.0, -2.0], [f64::NAN, 1.0], [-2.0, f64::INFINITY]] {
         let ranges = RANGES.map(|range| if range == RANGES[1] { wrong } else { range });
@@ -293,8 +288,7 @@ fn what_moves_the_point_by_rounding_alone_has_no_factor() {
     // The last joint slides along the axis that its theta turns about, and the point lies on it.
     let (inputs, last) = (Drawn::new(400, 5).inputs, 5 * (JOINTS - 1));
     let std: Vec<f64> = of_constants(&inputs).into_iter().step_by(2).collect();
-    let found =
-        Leverage::fit(&chain(), [0.0, 0.0, 0.2], (&inputs, JOINTS), &std, &Cancel::default()).unwrap();
+    let found = fit_leverage(&chain(), [0.0, 0.0, 0.2], (&inputs, JOINTS), &std, &Cancel::default()).unwrap();
     let factor = found.factor();
     let of = |row: usize| &factor[FACTOR_COLUMNS * row..][..FACTOR_COLUMNS];
     assert_eq!(of(last), [0.0; FACTOR_COLUMNS]);
@@ -307,13 +301,11 @@ fn a_leverage_of_more_joints_than_inputs_is_refused() {
     let links = [chain().links(), chain().links()].concat();
     let eight = Chain::new(Convention::Standard, links, Transform::IDENTITY, Transform::IDENTITY).unwrap();
     let plan = ConservativePlan { chain: Some(eight.clone()), ..plan() };
-    let refused = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default());
-    let error = FieldError::Length { what: "a configuration", found: JOINTS, expected: 2 * JOINTS };
-    assert_eq!(refused.map(drop), Err(error.clone()));
-    let mut parts = Conservative::fit(&self::plan(), fitted.samples(), fresh.samples(), &Cancel::default())
-        .unwrap()
-        .parts()
-        .clone();
+    let refused = plan.fit(fitted.samples(), fresh.samples(), &Cancel::default());
+    let error = BankError::Length { what: "a configuration", found: JOINTS, expected: 2 * JOINTS };
+    assert_eq!(refused.map(drop), Err(FieldError::Bank(error.clone())));
+    let mut parts =
+        self::plan().fit(fitted.samples(), fresh.samples(), &Cancel::default()).unwrap().parts().clone();
     let factor = vec![0.0; (eight.parameter_count() + MOVED) * FACTOR_COLUMNS];
     parts.leverage = Some(Leverage::new(&eight, CENTRE, &factor).unwrap());
     assert_eq!(Conservative::new(parts).map(drop), Err(error));
@@ -323,10 +315,10 @@ fn a_leverage_of_more_joints_than_inputs_is_refused() {
 fn no_inputs_are_refused_and_a_fit_ends_on_request() {
     let (fitted, fresh, cancel) = (Drawn::new(300, 1), Drawn::new(300, 2), Cancel::default());
     let nothing = ConservativePlan { kinds: Vec::new(), ranges: Vec::new(), ..plan() };
-    let refused = Conservative::fit(&nothing, fitted.samples(), fresh.samples(), &cancel);
+    let refused = nothing.fit(fitted.samples(), fresh.samples(), &cancel);
     assert!(refused.unwrap_err().to_string().starts_with("the number of inputs is 0"));
     cancel.request();
     let plan = ConservativePlan { chain: Some(chain()), ..plan() };
-    let ended = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &cancel).map(drop);
-    assert_eq!(ended, Err(FieldError::Estimate(EstimateError::Cancelled)));
+    let ended = plan.fit(fitted.samples(), fresh.samples(), &cancel).map(drop);
+    assert_eq!(ended, Err(FieldError::Cancelled(Cancelled)));
 }

@@ -5,8 +5,9 @@ use crate::common::{
     Arm, Fitted, Measure, Random, Truth, deviations, fit, fit_from, fitted, options, problem,
     root_mean_square, six_axes, subset,
 };
+use truearm_bank::Input;
 use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
-use truearm_field::{Drives, FieldError, FieldOptions, Input, fit_field, measurement_covariance};
+use truearm_field::{Drives, FieldError, FieldOptions, fit_field, measurement_covariance};
 
 const NOISE: f64 = 3e-5;
 

@@ -4,7 +4,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-mod banks;
 mod conservative;
 mod fitting;
 mod outliers;

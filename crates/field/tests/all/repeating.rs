@@ -4,8 +4,9 @@
 use std::time::{Duration, Instant};
 
 use crate::common::{Measure, Truth, fit_from, options, problem, scara, six_axes, with_threads};
-use truearm_estimate::{Cancel, EstimateError, Point};
+use truearm_estimate::Point;
 use truearm_field::{FieldError, FieldFit, Hyper, Posterior, restore};
+use truearm_kinematics::{Cancel, Cancelled};
 
 /// Everything that a fit says, as bits.
 fn bits(field: &FieldFit) -> Vec<u64> {
@@ -116,6 +117,6 @@ fn a_request_to_stop_is_obeyed_at_once() {
     });
     let Err(stopped) = fit_from(&arm, &set, constant, options) else { panic!("the fit went on") };
     let took = asked.join().unwrap().elapsed();
-    assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
+    assert_eq!(stopped, FieldError::Cancelled(Cancelled));
     assert!(took < Duration::from_secs(1), "stopped {took:?} after the request");
 }

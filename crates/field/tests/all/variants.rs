@@ -4,8 +4,9 @@
 use crate::common::{
     Arm, Measure, Truth, deviations, fit, fit_from, options, root_mean_square, scara, seven_axes, six_axes,
 };
+use truearm_bank::Input;
 use truearm_estimate::MeasurementSet;
-use truearm_field::{Hyper, Input};
+use truearm_field::Hyper;
 
 const NOISE: f64 = 3e-5;
 

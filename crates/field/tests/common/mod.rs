@@ -8,14 +8,11 @@
     reason = "each test binary uses a part of it"
 )]
 
-mod arms;
+#[path = "../../../bank/tests/common/mod.rs"]
+mod banks;
 mod measuring;
 mod pipeline;
-mod random;
 
-pub use arms::{Arm, Truth, scara, seven_axes, six_axes};
+pub use banks::{Arm, Random, Truth, scara, seven_axes, six_axes, with_threads};
 pub use measuring::{Measure, shots, subset};
-pub use pipeline::{
-    Fitted, deviations, fit, fit_from, fitted, options, problem, root_mean_square, spans, with_threads,
-};
-pub use random::Random;
+pub use pipeline::{Fitted, deviations, fit, fit_from, fitted, options, problem, root_mean_square, spans};

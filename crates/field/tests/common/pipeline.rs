@@ -1,10 +1,11 @@
 //! From measurements to constants to a field, as the product does it.
 
 use truearm_estimate::{
-    Cancel, ConstantFit, ConstantOptions, FrameMode, MeasurementSet, Point, Prior, Problem, fit_constant,
+    ConstantFit, ConstantOptions, FrameMode, MeasurementSet, Point, Prior, Problem, fit_constant,
     identifiability, residuals,
 };
 use truearm_field::{FieldError, FieldFit, FieldOptions, fit_field};
+use truearm_kinematics::Cancel;
 
 use super::Arm;
 
@@ -90,9 +91,4 @@ pub fn root_mean_square(values: &[f64]) -> f64 {
 /// Largest minus smallest.
 pub fn spans(values: impl Iterator<Item = f64> + Clone) -> f64 {
     values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
-}
-
-/// Runs in a pool of its own.
-pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }

@@ -8,7 +8,7 @@ use std::cmp::Reverse;
 use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lanes};
 
-use crate::FieldError;
+use crate::BankError;
 use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
 use crate::compiled_axis::{Abreast, CompiledAxis, Excited};
@@ -44,7 +44,8 @@ pub struct Compiled {
 }
 
 impl Compiled {
-    pub(crate) fn new(bank: &Bank) -> Self {
+    /// Prepares a bank for evaluation.
+    pub fn new(bank: &Bank) -> Self {
         let degrees = bank.blocks.iter().flat_map(|block| &block.grid.axes).map(|axis| axis.degree);
         let mut compiled = Self {
             input_count: bank.input_count,
@@ -120,11 +121,11 @@ impl Compiled {
     /// Adds the CEPs of the given inputs (n, I) to `out` (n, 5 L).
     ///
     /// # Errors
-    /// [`FieldError::Length`].
-    pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), FieldError> {
+    /// [`BankError::Length`].
+    pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), BankError> {
         let expected = self.poses(values)? * self.parameter_count;
         if out.len() != expected {
-            return Err(FieldError::Length { what: "parameters", found: out.len(), expected });
+            return Err(BankError::Length { what: "parameters", found: out.len(), expected });
         }
         if self.threaded(values) {
             let tasks = values.par_chunks(POSES_PER_TASK * self.input_count);
@@ -148,12 +149,12 @@ impl Compiled {
     /// Constants (5 L) plus the CEPs of the given inputs (n, I): (n, 5 L).
     ///
     /// # Errors
-    /// [`FieldError::Length`].
-    pub fn parameters(&self, constants: &[f64], values: &[f64]) -> Result<Vec<f64>, FieldError> {
+    /// [`BankError::Length`].
+    pub fn parameters(&self, constants: &[f64], values: &[f64]) -> Result<Vec<f64>, BankError> {
         let poses = self.poses(values)?;
         if constants.len() != self.parameter_count {
             let (found, expected) = (constants.len(), self.parameter_count);
-            return Err(FieldError::Length { what: "constants", found, expected });
+            return Err(BankError::Length { what: "constants", found, expected });
         }
         let mut out = Vec::with_capacity(poses * self.parameter_count);
         let group = constants.repeat(LANES);
@@ -176,11 +177,11 @@ impl Compiled {
         Ok(out)
     }
 
-    fn poses(&self, values: &[f64]) -> Result<usize, FieldError> {
+    fn poses(&self, values: &[f64]) -> Result<usize, BankError> {
         let poses = values.len() / self.input_count.max(1);
         let expected = poses * self.input_count;
         if expected != values.len() {
-            return Err(FieldError::Length { what: "inputs", found: values.len(), expected });
+            return Err(BankError::Length { what: "inputs", found: values.len(), expected });
         }
         Ok(poses)
     }

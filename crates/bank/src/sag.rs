@@ -90,7 +90,7 @@ pub struct Loads {
 
 impl Sag {
     /// From stored values; those of files that know nothing beside the end have no weights there.
-    pub(crate) fn restored(levers: Levers, outputs: Vec<usize>, weights: Vec<f64>) -> Self {
+    pub fn restored(levers: Levers, outputs: Vec<usize>, weights: Vec<f64>) -> Self {
         let outputs = levers.with_beside(outputs, |output| output);
         let weights = levers.with_beside(weights, |_| 0.0);
         Self { levers, outputs, weights }
@@ -132,7 +132,7 @@ impl Levers {
     }
 
     /// Weights of levers by these for levers by payloads in their inputs' own units.
-    pub(crate) fn in_own_units(self, mut weights: Vec<f64>) -> (Self, Vec<f64>) {
+    pub fn in_own_units(self, mut weights: Vec<f64>) -> (Self, Vec<f64>) {
         let own = lever_count(self.joint_count());
         for (payload, weights) in self.payloads.iter().zip(weights[own..].chunks_exact_mut(own)) {
             weights.iter_mut().for_each(|weight| *weight /= payload.unit);

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::EstimateError;
+/// The caller asked to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("stopped on request")]
+pub struct Cancelled;
 
 /// A flag shared between whoever may ask to stop and the work that obeys.
 #[derive(Debug, Clone, Default)]
@@ -20,11 +23,11 @@ impl Cancel {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Ends the work with [`EstimateError::Cancelled`] once a stop was asked for.
+    /// Ends the work with [`Cancelled`] once a stop was asked for.
     ///
     /// # Errors
-    /// [`EstimateError::Cancelled`] after [`Cancel::request`].
-    pub fn check(&self) -> Result<(), EstimateError> {
-        if self.0.load(Ordering::Relaxed) { Err(EstimateError::Cancelled) } else { Ok(()) }
+    /// [`Cancelled`] after [`Cancel::request`].
+    pub fn check(&self) -> Result<(), Cancelled> {
+        if self.0.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
     }
 }

@@ -1,6 +1,6 @@
 //! A bank of blocks: inputs in, CEPs out, by summing the weights of the excited cells.
 
-use crate::FieldError;
+use crate::BankError;
 use crate::cells::{Axis, Grid, MOST_AXES};
 use crate::compiled::Compiled;
 use crate::sag::{Levers, SAG_NAME, Sag};
@@ -49,7 +49,7 @@ impl Bank {
         parameter_count: usize,
         mut blocks: Vec<Block>,
         levers: Levers,
-    ) -> Result<Self, FieldError> {
+    ) -> Result<Self, BankError> {
         let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
         if let Some(block) = &sag {
             let (own, payloads) =
@@ -57,7 +57,7 @@ impl Bank {
             let ordered = payloads.is_sorted_by(|a, b| a < b);
             let known = payloads.iter().all(|input| (levers.joint_count()..input_count).contains(input));
             if !(own.iter().copied().eq(0..levers.joint_count()) && ordered && known) {
-                return Err(FieldError::Block { what: "the sag does not go over all joints, then payloads" });
+                return Err(BankError::Block { what: "the sag does not go over all joints, then payloads" });
             }
         }
         let sag = sag.map(|block| {
@@ -72,21 +72,21 @@ impl Bank {
     /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.
     ///
     /// # Errors
-    /// [`FieldError::Length`], [`FieldError::NotFinite`], [`FieldError::Block`].
-    pub fn check(&self) -> Result<(), FieldError> {
+    /// [`BankError::Length`], [`BankError::NotFinite`], [`BankError::Block`].
+    pub fn check(&self) -> Result<(), BankError> {
         self.check_sag()?;
         for block in &self.blocks {
             let (axes, inputs) = (&block.grid.axes, &block.grid.inputs);
             if !(1..=MOST_AXES).contains(&axes.len()) || !axes.iter().all(Axis::is_sound) {
-                return Err(FieldError::NotFinite { what: "axes of a block" });
+                return Err(BankError::NotFinite { what: "axes of a block" });
             }
             if inputs.len() != axes.len() {
                 let (found, expected) = (inputs.len(), axes.len());
-                return Err(FieldError::Length { what: "inputs of a block", found, expected });
+                return Err(BankError::Length { what: "inputs of a block", found, expected });
             }
             let expected = block.grid.cell_count() * block.outputs.len();
             if block.weights.len() != expected {
-                return Err(FieldError::Length {
+                return Err(BankError::Length {
                     what: "weights of a block",
                     found: block.weights.len(),
                     expected,
@@ -99,29 +99,29 @@ impl Bank {
             let input = inputs.iter().copied().max().unwrap_or(0);
             if input >= self.input_count {
                 let expected = self.input_count;
-                return Err(FieldError::Length { what: "inputs of a block", found: input + 1, expected });
+                return Err(BankError::Length { what: "inputs of a block", found: input + 1, expected });
             }
             let mut outputs = block.outputs.clone();
             outputs.sort_unstable();
             if !outputs.is_sorted_by(|a, b| a < b) {
-                return Err(FieldError::Block { what: "a block drives a parameter twice" });
+                return Err(BankError::Block { what: "a block drives a parameter twice" });
             }
             let output = block.outputs.iter().copied().max().unwrap_or(0);
             if output >= self.parameter_count {
                 let expected = self.parameter_count;
-                return Err(FieldError::Length { what: "outputs of a block", found: output + 1, expected });
+                return Err(BankError::Length { what: "outputs of a block", found: output + 1, expected });
             }
         }
         Ok(())
     }
 
-    fn check_sag(&self) -> Result<(), FieldError> {
+    fn check_sag(&self) -> Result<(), BankError> {
         let Some(sag) = &self.sag else { return Ok(()) };
         let inputs = sag.levers.input_count();
         let mut of_joint = vec![None; sag.levers.joint_count()];
         for (joint, output) in sag.levers.joints().zip(&sag.outputs) {
             if of_joint[joint].get_or_insert(*output) != output {
-                return Err(FieldError::Block { what: "the sag drives several parameters of one joint" });
+                return Err(BankError::Block { what: "the sag drives several parameters of one joint" });
             }
         }
         let output = sag.outputs.iter().copied().max().unwrap_or(0);
@@ -133,7 +133,7 @@ impl Bank {
         ];
         for (what, found, expected) in lengths {
             if found != expected {
-                return Err(FieldError::Length { what, found, expected });
+                return Err(BankError::Length { what, found, expected });
             }
         }
         check_weights(&sag.weights, "weights of the sag")
@@ -142,8 +142,8 @@ impl Bank {
     /// Adds the CEPs of the given inputs (n, I) to `out` (n, 5 L).
     ///
     /// # Errors
-    /// [`FieldError::Length`].
-    pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), FieldError> {
+    /// [`BankError::Length`].
+    pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), BankError> {
         self.compiled().add(values, out)
     }
 
@@ -159,18 +159,18 @@ impl Bank {
 }
 
 /// Refuses a reading that is no sum of inputs, or that is not alone.
-fn check_reading(factors: &[f64], inputs: usize, axes: usize) -> Result<(), FieldError> {
+fn check_reading(factors: &[f64], inputs: usize, axes: usize) -> Result<(), BankError> {
     if !factors.iter().all(|factor| factor.is_finite()) {
-        return Err(FieldError::NotFinite { what: "factors of a reading" });
+        return Err(BankError::NotFinite { what: "factors of a reading" });
     }
     if axes != 1 || factors.is_empty() || factors.len() > inputs {
-        return Err(FieldError::Block { what: "a reading is not one sum of the arm's joint values" });
+        return Err(BankError::Block { what: "a reading is not one sum of the arm's joint values" });
     }
     Ok(())
 }
 
 /// Refuses weights that are not finite, or that the tables' single precision does not hold.
-fn check_weights(weights: &[f64], what: &'static str) -> Result<(), FieldError> {
+fn check_weights(weights: &[f64], what: &'static str) -> Result<(), BankError> {
     let held = weights.iter().all(|weight| weight.abs() <= f64::from(f32::MAX));
-    if held { Ok(()) } else { Err(FieldError::NotFinite { what }) }
+    if held { Ok(()) } else { Err(BankError::NotFinite { what }) }
 }

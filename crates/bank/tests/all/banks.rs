@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use crate::common::{Random, Truth, six_axes, with_threads};
-use truearm_field::{Axis, Bank, Block, Compiled, FieldError, Grid, Input, Levers};
+use truearm_bank::{Axis, Bank, BankError, Block, Compiled, Grid, Input, Levers};
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
 const INPUTS: usize = 3;
@@ -230,7 +230,7 @@ fn banks_that_contradict_themselves_are_refused() {
     let refused = |change: &dyn Fn(&mut Bank), what: &str| {
         let mut bank = bank(2);
         change(&mut bank);
-        let Err(FieldError::Length { what: found, .. }) = bank.check() else { panic!("{what} was accepted") };
+        let Err(BankError::Length { what: found, .. }) = bank.check() else { panic!("{what} was accepted") };
         assert_eq!(found, what);
     };
     refused(&|bank| bank.blocks[1].weights.truncate(1), "weights of a block");
@@ -331,7 +331,7 @@ fn a_sag_that_no_fit_makes_is_refused() {
         &[0, 1, 2, 3, 4, 5, usize::MAX],
     ] {
         let refused = restored(inputs, &outputs).unwrap_err();
-        assert!(matches!(refused, FieldError::Block { .. }), "{inputs:?}: {refused}");
+        assert!(matches!(refused, BankError::Block { .. }), "{inputs:?}: {refused}");
     }
     for weight in [f64::NAN, f64::INFINITY, 1e39] {
         let mut block = Block {
@@ -343,11 +343,11 @@ fn a_sag_that_no_fit_makes_is_refused() {
         };
         block.weights[2] = weight;
         let refused = Bank::restored(8, parameters, vec![block], levers.clone()).unwrap_err();
-        assert!(matches!(refused, FieldError::NotFinite { .. }), "{weight}: {refused}");
+        assert!(matches!(refused, BankError::NotFinite { .. }), "{weight}: {refused}");
     }
     let mut elsewhere = outputs.clone();
     elsewhere[1] = 5;
-    assert!(matches!(restored(&[0, 1, 2, 3, 4, 5], &elsewhere), Err(FieldError::Block { .. })));
+    assert!(matches!(restored(&[0, 1, 2, 3, 4, 5], &elsewhere), Err(BankError::Block { .. })));
 }
 
 #[test]

@@ -5,12 +5,12 @@
 //! the centre deviates by no more than `s_p + r s_r`: by Minkowski's inequality the root mean square of `p + w x r` is at
 //! most that of `p` plus `r` times that of `w`. The centre is where was measured: of the flange itself positions alone tell
 //! little. Each is `exp(level + sum of tables)`, that of the position times a [`Leverage`]: B-spline tables over every
-//! input and one over a few inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
+//! input and one over a few inputs together, fitted to exact values and raised, where a calibration is made. Where an input leaves the range
 //! that the tables were fitted in, and nowhere above, stands the largest value that the prior allows.
 
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lanes};
 
-use crate::FieldError;
+use crate::BankError;
 use crate::bank::Bank;
 use crate::compiled::{Compiled, FieldScratch};
 use crate::leverage::{Leverage, LeverageScratch};
@@ -55,10 +55,10 @@ impl Conservative {
     /// Prepares stored parts for evaluation.
     ///
     /// # Errors
-    /// [`FieldError::Length`] where the parts do not fit together, [`FieldError::NotFinite`].
-    pub fn new(parts: ConservativeParts) -> Result<Self, FieldError> {
+    /// [`BankError::Length`] where the parts do not fit together, [`BankError::NotFinite`].
+    pub fn new(parts: ConservativeParts) -> Result<Self, BankError> {
         let length = |what, found, expected| {
-            if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
+            if found == expected { Ok(()) } else { Err(BankError::Length { what, found, expected }) }
         };
         length("tables of the standard deviation", parts.tables.parameter_count, BOUNDED)?;
         length("ranges of the standard deviation", parts.ranges.len(), parts.tables.input_count)?;
@@ -69,7 +69,7 @@ impl Conservative {
         let weights = parts.tables.blocks.iter().flat_map(|block| &block.weights);
         let others = parts.level.iter().chain(&parts.largest).chain(&parts.centre);
         if !weights.chain(others).all(|value| value.is_finite()) {
-            return Err(FieldError::NotFinite { what: "tables of the standard deviation" });
+            return Err(BankError::NotFinite { what: "tables of the standard deviation" });
         }
         let compiled = parts.tables.compiled();
         Ok(Self { parts, compiled })
@@ -135,12 +135,12 @@ impl Conservative {
     /// Both numbers of each configuration, inputs (n, I) to (n, 2).
     ///
     /// # Errors
-    /// [`FieldError::Length`].
-    pub fn std(&self, inputs: &[f64]) -> Result<Vec<f64>, FieldError> {
+    /// [`BankError::Length`].
+    pub fn std(&self, inputs: &[f64]) -> Result<Vec<f64>, BankError> {
         let poses = inputs.len() / self.input_count().max(1);
         let expected = poses * self.input_count();
         if expected != inputs.len() {
-            return Err(FieldError::Length { what: "inputs", found: inputs.len(), expected });
+            return Err(BankError::Length { what: "inputs", found: inputs.len(), expected });
         }
         let mut out = vec![0.0; BOUNDED * poses];
         dispatch(All { field: self, inputs, out: &mut out });
