@@ -16,8 +16,8 @@ use crate::FieldError;
 use crate::columns::Columns;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
 use crate::hyper::{
-    AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
-    AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
+    AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
+    AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
 use crate::hyper_prior::HyperPrior;
 use crate::information::Slopes;
@@ -196,7 +196,7 @@ impl<'a> Evidence<'a> {
                 })
             })
             .collect();
-        let mut gradient = vec![0.0; hyper.to_logs().len()];
+        let mut gradient = vec![0.0; hyper.count()];
         for part in &parts {
             gradient.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
         }
@@ -236,7 +236,7 @@ impl Kernel for PoseGradient<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> Vec<f64> {
         if self.evidence.training.rows(self.pose).is_empty() {
-            return vec![0.0; self.hyper.to_logs().len()];
+            return vec![0.0; self.hyper.count()];
         }
         let shares = self.shares::<I>();
         self.contract(&shares)
@@ -346,8 +346,7 @@ impl PoseGradient<'_> {
     #[inline(always)]
     fn contract(&self, shares: &Shares) -> Vec<f64> {
         let hyper = self.hyper;
-        let mut gradient = vec![0.0; hyper.to_logs().len()];
-        let noise = gradient.len() - 2;
+        let mut gradient = vec![0.0; hyper.count()];
         for (class, (factor, share)) in hyper.constant.iter().zip(shares.constants()).enumerate() {
             gradient[AT_CONSTANT + class] = factor.powi(2) * share.iter().sum::<f64>();
         }
@@ -360,13 +359,11 @@ impl PoseGradient<'_> {
                 gradient[hyper.at_unevenness() + joint] += anew;
             }
         }
-        gradient[noise] = shares.noise[0];
-        gradient[noise + 1] = shares.noise[1];
+        gradient[hyper.at_noise()..].copy_from_slice(&shares.noise);
         self.contract_single(shares, &mut gradient);
-        let mut first = AT_PRODUCTS;
-        for (product, kernels) in hyper.products.iter().zip(self.kernels.products.iter()) {
+        for (m, (product, kernels)) in hyper.products.iter().zip(self.kernels.products.iter()).enumerate() {
+            let first = hyper.at_product(m);
             self.contract_product(product, kernels, shares, &mut gradient[first..first + product.len()]);
-            first += product.len();
         }
         gradient
     }
@@ -406,7 +403,8 @@ impl PoseGradient<'_> {
                 *sum += variance * share * kernel;
             }
         }
-        for (slope, (k, factor)) in gradient[3..].iter_mut().zip(exponent_factors(product)) {
+        for (slope, (k, factor)) in gradient[Product::AMPLITUDES..].iter_mut().zip(exponent_factors(product))
+        {
             *slope += factor * dot(&total, &self.evidence.pairings[self.pose].distances[k]);
         }
     }

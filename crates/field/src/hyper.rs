@@ -4,6 +4,8 @@
 //! measurable at four hundred (docs/decisions/0003). What they do not repeat is each one's own, about a level that they share
 //! (docs/decisions/0040). Each has a wide log-normal prior centred on its start, amplitudes about a factor that they share.
 
+use std::iter;
+
 use truearm_bank::{Input, InputKind, UPRIGHT};
 
 /// A block that varies with several joints together.
@@ -139,6 +141,9 @@ pub const WAVE_NAME: &str = "wave";
 pub const WRIST_NAME: &str = "wrist";
 
 impl Product {
+    /// How many amplitudes a block has, before its lengths: one of each class.
+    pub const AMPLITUDES: usize = 3;
+
     /// A block at the centre of its priors.
     pub fn start(name: &str, joints: Vec<usize>) -> Self {
         let amplitudes = Self::amplitude_ranges(name).map(|r| r.start);
@@ -150,9 +155,9 @@ impl Product {
         if name == WRIST_NAME { WRIST } else { MAJOR }
     }
 
-    /// Hyper-parameters of the block: three amplitudes, then the lengths.
+    /// Hyper-parameters of the block: the amplitudes, then the lengths.
     pub fn len(&self) -> usize {
-        3 + self.lengths.len()
+        Self::AMPLITUDES + self.lengths.len()
     }
 
     /// Whether the block has no joints.
@@ -220,50 +225,46 @@ impl Hyper {
         starts
     }
 
+    /// Shows all hyper-parameters, each with its bounds and prior, in the order of their logarithms: `AT_...` are places in it.
+    fn visit(&mut self, mut see: impl FnMut(&mut f64, Range)) {
+        self.constant.iter_mut().for_each(|factor| see(factor, CONSTANT));
+        see(&mut self.own, OWN);
+        see(&mut self.own_length, OWN_LENGTH);
+        see(&mut self.own_cycles, OWN_CYCLES);
+        self.smooth.iter_mut().zip(SMOOTH).for_each(|(amplitude, range)| see(amplitude, range));
+        see(&mut self.smooth_length, SMOOTH_LENGTH);
+        see(&mut self.smooth_line_length, SMOOTH_LINE_LENGTH);
+        see(&mut self.repeatability, REPEATABILITY);
+        see(&mut self.sag, SAG);
+        for product in &mut self.products {
+            let ranges = Product::amplitude_ranges(&product.name);
+            product.amplitudes.iter_mut().zip(ranges).for_each(|(amplitude, range)| see(amplitude, range));
+            product.lengths.iter_mut().for_each(|length| see(length, PRODUCT_LENGTH));
+        }
+        self.unevenness.iter_mut().for_each(|factor| see(factor, UNEVENNESS));
+        for noise in &mut self.noise {
+            let about = range(*noise, NOISE_LOW, NOISE_HIGH, f64::INFINITY);
+            see(noise, about);
+        }
+    }
+
     /// Logarithms of all hyper-parameters.
     pub fn to_logs(&self) -> Vec<f64> {
-        let mut values = self.constant.to_vec();
+        let mut logs = Vec::with_capacity(self.count());
         // Fields that do not ripple are near those that hardly do.
-        values.extend([self.own, self.own_length, self.own_cycles.max(OWN_CYCLES.low)]);
-        values.extend(self.smooth);
-        values.extend([self.smooth_length, self.smooth_line_length, self.repeatability, self.sag]);
-        for product in &self.products {
-            values.extend(product.amplitudes);
-            values.extend(&product.lengths);
-        }
-        values.extend(&self.unevenness);
-        values.extend(self.noise);
-        values.into_iter().map(f64::ln).collect()
+        let mut all = Self { own_cycles: self.own_cycles.max(OWN_CYCLES.low), ..self.clone() };
+        all.visit(|value, _| logs.push(value.ln()));
+        logs
     }
 
     /// The inverse of [`Hyper::to_logs`], for the same blocks.
     pub fn with_logs(&self, logs: &[f64]) -> Self {
-        let at = |index: usize| logs[index].exp();
-        let three = |first: usize| std::array::from_fn(|k| at(first + k));
-        let mut first = AT_PRODUCTS;
-        let mut products = self.products.clone();
-        for product in &mut products {
-            product.amplitudes = three(first);
-            let lengths = product.lengths.iter_mut().enumerate();
-            lengths.for_each(|(k, length)| *length = at(first + 3 + k));
-            first += product.len();
-        }
-        let noise = first + self.unevenness.len();
-        Self {
-            constant: three(AT_CONSTANT),
-            own: at(AT_OWN),
-            own_length: at(AT_OWN_LENGTH),
-            own_cycles: at(AT_OWN_CYCLES),
-            smooth: three(AT_SMOOTH),
-            smooth_length: at(AT_SMOOTH_LENGTH),
-            smooth_line_length: at(AT_SMOOTH_LINE_LENGTH),
-            repeatability: at(AT_REPEATABILITY),
-            sag: at(AT_SAG),
-            products,
-            unevenness: (first..noise).map(at).collect(),
-            noise: [at(noise), at(noise + 1)],
-            ..self.clone()
-        }
+        let (mut other, mut place) = (self.clone(), 0);
+        other.visit(|value, _| {
+            *value = logs[place].exp();
+            place += 1;
+        });
+        other
     }
 
     /// What a joint misses anew at every pose, rad.
@@ -271,9 +272,24 @@ impl Hyper {
         self.repeatability * self.unevenness.get(joint).copied().unwrap_or(UNEVENNESS.start)
     }
 
+    /// How many hyper-parameters have logarithms.
+    pub fn count(&self) -> usize {
+        self.at_noise() + self.noise.len()
+    }
+
+    /// Position of the first hyper-parameter of a product among the logarithms; of none more, where they end.
+    pub fn at_product(&self, product: usize) -> usize {
+        AT_PRODUCTS + self.products[..product].iter().map(Product::len).sum::<usize>()
+    }
+
     /// Position of the joints' unevenness among the logarithms.
     pub fn at_unevenness(&self) -> usize {
-        AT_PRODUCTS + self.products.iter().map(Product::len).sum::<usize>()
+        self.at_product(self.products.len())
+    }
+
+    /// Position of the noise among the logarithms.
+    pub fn at_noise(&self) -> usize {
+        self.at_unevenness() + self.unevenness.len()
     }
 
     /// Length scale of the `smooth` block over an input.
@@ -286,27 +302,22 @@ impl Hyper {
 
     /// Positions of the amplitudes among the logarithms: `own`, `smooth`, `sag`, then each product's.
     pub fn amplitude_positions(&self) -> Vec<usize> {
-        let mut positions = vec![AT_OWN, AT_SMOOTH, AT_SMOOTH + 1, AT_SMOOTH + 2, AT_SAG];
-        let mut first = AT_PRODUCTS;
-        for product in &self.products {
-            positions.extend(first..first + 3);
-            first += product.len();
+        let mut positions = vec![AT_OWN];
+        positions.extend((0..self.smooth.len()).map(|class| AT_SMOOTH + class));
+        positions.push(AT_SAG);
+        for product in 0..self.products.len() {
+            positions.extend((0..Product::AMPLITUDES).map(|class| self.at_product(product) + class));
         }
         positions
     }
 
     /// The same hyper-parameters with other widenings, in the order of [`Hyper::amplitude_positions`].
     pub fn with_widenings(&self, widenings: &[f64]) -> Self {
-        let three = |first: usize| std::array::from_fn(|k| widenings[first + k]);
-        let mut other = Self {
-            own_widening: widenings[0],
-            smooth_widening: three(1),
-            sag_widening: widenings[4],
-            ..self.clone()
-        };
-        for (k, product) in other.products.iter_mut().enumerate() {
-            product.widening = three(5 + 3 * k);
-        }
+        let mut other = self.clone();
+        let own = iter::once(&mut other.own_widening).chain(&mut other.smooth_widening);
+        let all = own.chain([&mut other.sag_widening]);
+        let all = all.chain(other.products.iter_mut().flat_map(|product| &mut product.widening));
+        all.zip(widenings).for_each(|(widening, found)| *widening = *found);
         other
     }
 
@@ -325,16 +336,8 @@ impl Hyper {
 
     /// Bounds and priors in the order of the logarithms.
     pub fn ranges(&self) -> Vec<Range> {
-        let mut ranges = vec![CONSTANT; 3];
-        ranges.extend([OWN, OWN_LENGTH, OWN_CYCLES]);
-        ranges.extend(SMOOTH);
-        ranges.extend([SMOOTH_LENGTH, SMOOTH_LINE_LENGTH, REPEATABILITY, SAG]);
-        for product in &self.products {
-            ranges.extend(Product::amplitude_ranges(&product.name));
-            ranges.extend(vec![PRODUCT_LENGTH; product.lengths.len()]);
-        }
-        ranges.extend(vec![UNEVENNESS; self.unevenness.len()]);
-        ranges.extend(self.noise.map(|start| range(start, NOISE_LOW, NOISE_HIGH, f64::INFINITY)));
+        let mut ranges = Vec::with_capacity(self.count());
+        self.clone().visit(|_, range| ranges.push(range));
         ranges
     }
 
@@ -380,6 +383,32 @@ mod tests {
         }
         assert_eq!(back.major_joints(), [1, 2]);
         assert_eq!(back.products[1].joints, [3, 4, 5]);
+    }
+
+    #[test]
+    fn each_is_where_its_position_says() {
+        let start = Hyper::start(&[1, 2], 4, [1e-4, 3e-4]);
+        let places: Vec<f64> = (0..start.count()).map(|place| place as f64).collect();
+        let of_places = start.with_logs(&places);
+        let [major, wrist] = &of_places.products[..] else { panic!("two products") };
+        for (value, place) in [
+            (of_places.constant[1], AT_CONSTANT + 1),
+            (of_places.own, AT_OWN),
+            (of_places.own_length, AT_OWN_LENGTH),
+            (of_places.own_cycles, AT_OWN_CYCLES),
+            (of_places.smooth[2], AT_SMOOTH + 2),
+            (of_places.smooth_length, AT_SMOOTH_LENGTH),
+            (of_places.smooth_line_length, AT_SMOOTH_LINE_LENGTH),
+            (of_places.repeatability, AT_REPEATABILITY),
+            (of_places.sag, AT_SAG),
+            (major.amplitudes[0], start.at_product(0)),
+            (major.lengths[1], start.at_product(0) + Product::AMPLITUDES + 1),
+            (wrist.amplitudes[2], start.at_product(1) + 2),
+            (of_places.unevenness[3], start.at_unevenness() + 3),
+            (of_places.noise[1], start.at_noise() + 1),
+        ] {
+            assert_eq!(value, (place as f64).exp(), "place {place}");
+        }
     }
 
     #[test]

@@ -13,8 +13,8 @@ use truearm_estimate::dense::{Cholesky, add_product, product, symmetric_product,
 
 use crate::continuous::{Continuous, Pairing, exponent_factors};
 use crate::hyper::{
-    AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
-    AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
+    AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
+    AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
 use crate::pairs::ByColumn;
 use crate::training::{Class, Training};
@@ -68,7 +68,7 @@ impl Slopes<'_> {
             .into_par_iter()
             .map_init(|| Mat::zeros(poses, poses), |room, slope| self.shares(slope, &pulls, room))
             .collect();
-        let mut out = Mat::zeros(self.by_column.rows, self.hyper.to_logs().len());
+        let mut out = Mat::zeros(self.by_column.rows, self.hyper.count());
         for (position, values) in shares.into_iter().flatten().chain(self.without_kernels(&pulls)) {
             out.col_as_slice_mut(position).iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         }
@@ -157,20 +157,16 @@ impl Slopes<'_> {
             Slope::Smooth => each(AT_SMOOTH, hyper.smooth),
             Slope::SmoothByLength => vec![(AT_SMOOTH_LENGTH, squares(hyper.smooth, 1.0))],
             Slope::SmoothByLineLength => vec![(AT_SMOOTH_LINE_LENGTH, squares(hyper.smooth, 1.0))],
-            Slope::Product(m) => each(self.first_of(m), hyper.products[m].amplitudes),
+            Slope::Product(m) => each(hyper.at_product(m), hyper.products[m].amplitudes),
             Slope::ProductByLength(m, k) => {
                 let product = &hyper.products[m];
                 let of_length = exponent_factors(product).skip(k).take(1);
-                let part =
-                    |(_, factor)| (self.first_of(m) + 3 + k, squares(product.amplitudes, 2.0 * factor));
+                let part = |(_, factor)| {
+                    (hyper.at_product(m) + Product::AMPLITUDES + k, squares(product.amplitudes, 2.0 * factor))
+                };
                 of_length.map(part).collect()
             }
         }
-    }
-
-    /// Position of a product's first hyper-parameter.
-    fn first_of(&self, m: usize) -> usize {
-        AT_PRODUCTS + self.hyper.products[..m].iter().map(Product::len).sum::<usize>()
     }
 
     /// Writes what a kernel is between pose `j` and the poses from it on, (n - j,).
@@ -229,7 +225,7 @@ impl Slopes<'_> {
                 (joint < hyper.unevenness.len()).then(|| (hyper.at_unevenness() + joint, shared.clone()));
             own.into_iter().chain([(AT_REPEATABILITY, shared)])
         });
-        let first = hyper.to_logs().len() - hyper.noise.len();
+        let first = hyper.at_noise();
         let noise = (0..hyper.noise.len()).map(|kind| {
             let slope = |(row, alpha): (usize, &f64)| {
                 let counts = usize::from(self.training.is_orientation[row]) == kind;
