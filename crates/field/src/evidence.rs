@@ -5,6 +5,7 @@
 //! gradient is `1/2 sum (alpha alpha^T - P) o dK` with `alpha = P r` (Rasmussen and Williams 2006, eq. 5.9). The
 //! log-normal priors of the hyper-parameters are added.
 
+use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use faer::Mat;
@@ -14,6 +15,7 @@ use truearm_kinematics::{Cancel, Isa, Kernel, dispatch};
 
 use crate::FieldError;
 use crate::columns::Columns;
+use crate::condensed::Condensed;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
 use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
@@ -27,7 +29,10 @@ use crate::training::Training;
 
 /// The evidence of one training set under any hyper-parameters.
 pub struct Evidence<'a> {
-    training: &'a Training,
+    training: Cow<'a, Training>,
+    /// Rows of zeros, as [`Condensed`] has them, and what it gained.
+    silent: Vec<(usize, usize)>,
+    gained: f64,
     by_column: ByColumn,
     pairings: Vec<Pairing>,
     room: Mutex<Option<Room>>,
@@ -78,8 +83,19 @@ struct Restricted {
 impl<'a> Evidence<'a> {
     /// Of a training set; looks at `cancel` before each point.
     pub fn new(training: &'a Training, cancel: &'a Cancel) -> Self {
+        let Some(Condensed { training, silent, gained }) = Condensed::of(training) else {
+            return Self::by_row(training, cancel);
+        };
+        let (by_column, pairings) = (ByColumn::new(&training), pairings(&training));
+        let training = Cow::Owned(training);
+        Self { training, silent, gained, by_column, pairings, room: Mutex::new(None), cancel }
+    }
+
+    /// The same of the rows as they are, for what is told of each.
+    pub fn by_row(training: &'a Training, cancel: &'a Cancel) -> Self {
         let (by_column, pairings) = (ByColumn::new(training), pairings(training));
-        Self { training, by_column, pairings, room: Mutex::new(None), cancel }
+        let (training, silent) = (Cow::Borrowed(training), Vec::new());
+        Self { training, silent, gained: 0.0, by_column, pairings, room: Mutex::new(None), cancel }
     }
 
     /// Evidence and prior with their gradient at a point.
@@ -112,14 +128,14 @@ impl<'a> Evidence<'a> {
         further: impl FnOnce(&Continuous, &Restricted) -> T,
     ) -> Result<(Score, T), FieldError> {
         self.cancel.check()?;
-        let kernels = Continuous::new(self.training, &self.pairings, hyper);
+        let kernels = Continuous::new(&self.training, &self.pairings, hyper);
         let [mut covariance, projected] = self.room().take().unwrap_or_else(|| self.empty());
-        write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
+        write_covariance(&self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
         let restricted = self.restricted(covariance, projected)?;
         let mut gradient = self.gradient(hyper, &kernels, &restricted);
         let further = further(&kernels, &restricted);
         let prior = HyperPrior::new(hyper);
-        let value = restricted.value + prior.value();
+        let value = restricted.value + self.of_silent(hyper) + prior.value();
         *self.room() = Some([restricted.factor.into_matrix(), restricted.projected]);
         prior.add_gradient(&mut gradient);
         Ok((Score { value, gradient }, further))
@@ -132,7 +148,7 @@ impl<'a> Evidence<'a> {
     pub fn value(&self, hyper: &Hyper) -> Result<f64, FieldError> {
         let projection = self.projection(hyper)?;
         let (_, value) = self.explained(&projection, &projection.root());
-        Ok(value + HyperPrior::new(hyper).value())
+        Ok(value + self.of_silent(hyper) + HyperPrior::new(hyper).value())
     }
 
     /// What pulls at the rows, P r (R,): their residual over the covariance that it has under the hyper-parameters.
@@ -146,10 +162,10 @@ impl<'a> Evidence<'a> {
 
     fn projection(&self, hyper: &Hyper) -> Result<Projection, FieldError> {
         self.cancel.check()?;
-        let kernels = Continuous::new(self.training, &self.pairings, hyper);
+        let kernels = Continuous::new(&self.training, &self.pairings, hyper);
         let mut covariance = Mat::zeros(self.by_column.rows, self.by_column.rows);
-        write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
-        Projection::new(self.training, covariance, self.cancel)
+        write_covariance(&self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
+        Projection::new(&self.training, covariance, self.cancel)
     }
 
     /// P r and the logarithm of the restricted likelihood.
@@ -160,6 +176,14 @@ impl<'a> Evidence<'a> {
         let known: f64 = self.training.setup_precision.iter().map(|known| known.ln()).sum();
         let value = -0.5 * (factor.log_determinant() + inner.log_determinant() - known + fit);
         (alpha, value)
+    }
+
+    /// What rows of zeros add to the restricted likelihood.
+    fn of_silent(&self, hyper: &Hyper) -> f64 {
+        let of = |&(row, count): &(usize, usize)| {
+            count as f64 * self.training.noise_variance(row, hyper.noise).ln()
+        };
+        self.gained - 0.5 * self.silent.iter().map(of).sum::<f64>()
     }
 
     fn room(&self) -> MutexGuard<'_, Option<Room>> {
@@ -173,7 +197,7 @@ impl<'a> Evidence<'a> {
 
     /// From the covariance's lower triangle and room for P.
     fn restricted(&self, covariance: Mat<f64>, mut projected: Mat<f64>) -> Result<Restricted, FieldError> {
-        let projection = Projection::new(self.training, covariance, self.cancel)?;
+        let projection = Projection::new(&self.training, covariance, self.cancel)?;
         let root = projection.root();
         let (alpha, value) = self.explained(&projection, &root);
         let Projection { factor, .. } = projection;
@@ -199,6 +223,11 @@ impl<'a> Evidence<'a> {
         let mut gradient = vec![0.0; hyper.count()];
         for part in &parts {
             gradient.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
+        }
+        for &(row, count) in &self.silent {
+            let slope = self.training.noise_slope(row, hyper.noise);
+            gradient[hyper.at_noise()] -=
+                count as f64 * slope / self.training.noise_variance(row, hyper.noise);
         }
         gradient
     }
@@ -270,7 +299,7 @@ impl Shares {
 impl PoseGradient<'_> {
     #[inline(always)]
     fn shares<I: Isa>(&self) -> Shares {
-        let training = self.evidence.training;
+        let training = &*self.evidence.training;
         let by_column = &self.evidence.by_column;
         let rows = training.rows(self.pose);
         let first = rows.start;
@@ -314,7 +343,7 @@ impl PoseGradient<'_> {
 
     /// Sums over the rows of each pose from this one on, in runs of eight; columns of rows from `first` on.
     fn by_pose(&self, first: usize, by_row: &Columns) -> Columns {
-        let training = self.evidence.training;
+        let training = &*self.evidence.training;
         let poses = self.pose..training.pose_count();
         let mut by_pose = Columns::zeros(by_row.iter().len(), padded(poses.len()));
         for (sums, values) in by_pose.iter_mut().zip(by_row.iter()) {

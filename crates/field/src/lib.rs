@@ -18,6 +18,7 @@ mod ascent;
 pub mod cmac;
 mod columns;
 mod compass;
+mod condensed;
 mod conservative_fit;
 mod continuous;
 mod data_space;

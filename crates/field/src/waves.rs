@@ -82,7 +82,7 @@ pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result
     if training.pose_count() < FEWEST {
         return Ok(found.waves);
     }
-    let (evidence, by_column) = (Evidence::new(training, cancel), ByColumn::new(training));
+    let (evidence, by_column) = (Evidence::by_row(training, cancel), ByColumn::new(training));
     let drives: Vec<(usize, usize, f64)> = by_column.curved().collect();
     for _ in 0..ROUNDS {
         let pull = evidence.pull(&found)?;

@@ -6,9 +6,11 @@ use truearm_kinematics::{Cancel, Cancelled, lever_count};
 
 use super::oracle::{Exact, Oracle};
 use super::sets::{
-    by_readings, hyper, line_inputs, loaded, poses_in_two_groups, positions, rippling, several_shots,
+    by_readings, four_targets, hyper, line_inputs, loaded, poses_in_two_groups, positions, rippling,
+    several_shots,
 };
 use crate::FieldError;
+use crate::condensed::Condensed;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::hyper_prior::HyperPrior;
@@ -77,6 +79,25 @@ fn gradient_and_value_with_several_shots_of_poses() {
     // Below what shots differ by nothing changes with the noise.
     let quiet = Hyper { noise: [0.4 * training.shot[0].sqrt(), 1e-4], ..hyper(&training, 6) };
     check_gradient(&training, &quiet);
+}
+
+#[test]
+fn several_targets_are_worth_six_rows_and_the_evidence_stays() {
+    let training = four_targets(20);
+    let few = Condensed::of(&training).unwrap().training;
+    assert!(few.row_count() < 20 * 9 + 2 * (training.setup_width + 1), "{}", few.row_count());
+    let hyper = hyper(&training, 6);
+    check_value(&training, &hyper);
+    check_gradient(&training, &hyper);
+    let cancel = Cancel::default();
+    let [few, all] = [Evidence::new(&training, &cancel), Evidence::by_row(&training, &cancel)]
+        .map(|evidence| evidence.informed(&hyper).unwrap());
+    assert!((few.score.value / all.score.value - 1.0).abs() < 1e-12);
+    for (few, all) in few.score.gradient.iter().zip(&all.score.gradient) {
+        assert!((few - all).abs() < 1e-8 * (1.0 + all.abs()), "{few} instead of {all}");
+    }
+    let apart = (few.information - &all.information).norm_max() / all.information.norm_max();
+    assert!(apart < 1e-8, "{apart}");
 }
 
 #[test]

@@ -64,6 +64,20 @@ pub fn several_shots(poses: usize) -> Training {
     join(rows_of(&arm, &all, |_| ()), &groups, all.rows_per_pose()).training
 }
 
+/// Four targets and orientations, some not measured, with rows of a sigma and a weight of their own.
+pub fn four_targets(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    let measure = Measure { targets: 4, groups: 2, orientation: Some(1e-4), ..Measure::poses(poses) };
+    let mut set = measure.of(&arm);
+    for pose in 0..poses {
+        set.sigma[pose] = 1e-5 * (pose % 2) as f64;
+        set.weight[pose] = [1.0, 0.6, 1.0, 1e-3][pose % 4];
+    }
+    set.targets[12 * 4 + 3..12 * 4 + 6].fill(f64::NAN);
+    set.targets[12 * 7..12 * 8].fill(f64::NAN);
+    rows_of(&arm, &set, |_| ())
+}
+
 /// A prismatic joint and a feature.
 pub fn line_inputs(poses: usize) -> Training {
     let arm = scara(Truth { own: 2e-4, ..Truth::RIGID });
