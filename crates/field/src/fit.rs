@@ -40,12 +40,8 @@ pub struct FieldOptions {
     pub feature_values: Vec<f64>,
     /// Drives that turn several joints, with whose readings curves may go.
     pub drives: Option<Drives>,
-    /// Hyper-parameters to use instead of searching for them.
-    pub hyper: Option<Hyper>,
-    /// Where a fit to nearly the same measurements ended, which the search begins at.
-    pub near: Option<Start>,
-    /// Whether a search from nothing stands against the one that begins near.
-    pub contested: bool,
+    /// Where the search for hyper-parameters begins.
+    pub begin: Begin,
     /// Whether hyper-parameters of a search on a part of the poses are enough.
     pub rough: bool,
     /// Looked at between evaluations.
@@ -93,11 +89,41 @@ impl FieldOptions {
     }
 }
 
-/// Where a search of hyper-parameters begins.
+/// Where a fit to nearly the same measurements ended.
 #[derive(Debug, Clone)]
 pub struct Start {
     hyper: Hyper,
     evidence: f64,
+}
+
+/// Where the search for hyper-parameters begins.
+#[derive(Debug, Clone, Default)]
+pub enum Begin {
+    /// From nothing but the rows.
+    #[default]
+    Anew,
+    /// It does not: these are used.
+    Known(Hyper),
+    /// Where a fit to nearly the same measurements ended.
+    Near(Start),
+    /// There, with a search from nothing beside it: the more probable end wins.
+    Contested(Start),
+}
+
+impl Begin {
+    /// Whether hyper-parameters are looked for.
+    fn searches(&self) -> bool {
+        !matches!(self, Self::Known(_))
+    }
+
+    /// Hyper-parameters that were found before.
+    fn found(&self) -> Option<&Hyper> {
+        match self {
+            Self::Anew => None,
+            Self::Known(hyper) => Some(hyper),
+            Self::Near(start) | Self::Contested(start) => Some(&start.hyper),
+        }
+    }
 }
 
 /// A variable calibration.
@@ -194,7 +220,7 @@ pub fn fit_field(
             break;
         }
         let Judged { posterior, .. } = judged;
-        let posterior = if news.spoils() && options.hyper.is_none() {
+        let posterior = if news.spoils() && options.begin.searches() {
             drop(posterior);
             hyper = search.contested(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?
@@ -254,8 +280,7 @@ fn rows(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Joine
         let rule = "a field needs some: give positions or orientations whose weights are not zero";
         return Err(FieldError::Option { what: "the number of measured values", value: 0, rule });
     }
-    let begun = options.hyper.iter().chain(options.near.as_ref().map(|near| &near.hyper));
-    for hyper in begun {
+    if let Some(hyper) = options.begin.found() {
         let drives = options.drives.as_ref().map_or(0, Drives::len);
         hyper.check(&joined.training.inputs, problem.chain.joint_count(), drives)?;
     }
@@ -278,23 +303,37 @@ struct Search<'a> {
 impl Search<'_> {
     /// Hyper-parameters that the judgement of all poses begins with.
     fn first(&mut self, training: &mut Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
-        if let Some(hyper) = &self.options.hyper {
-            return self.judged_by_part(training, hyper.clone(), noise);
+        match &self.options.begin {
+            Begin::Known(hyper) => self.judged_by_part(training, hyper.clone(), noise),
+            Begin::Anew => {
+                let found = self.searched(training, noise)?;
+                let found = self.judged_by_part(training, found, noise)?;
+                if self.options.rough { Ok(found) } else { self.finished(training, found) }
+            }
+            Begin::Near(start) => {
+                let begun = self.begun(training, start, noise)?;
+                if self.options.rough {
+                    self.again(&middle_of(training), begun)
+                } else {
+                    self.finished(training, begun)
+                }
+            }
+            Begin::Contested(start) => {
+                let begun = self.begun(training, start, noise)?;
+                self.contested(training, begun, noise)
+            }
         }
-        let Some(near) = &self.options.near else {
-            let found = self.searched(training, noise)?;
-            let found = self.judged_by_part(training, found, noise)?;
-            return if self.options.rough { Ok(found) } else { self.finished(training, found) };
-        };
-        self.evidence = near.evidence;
-        let begun = self.judged_by_part(training, near.hyper.clone(), noise)?;
-        if self.options.contested {
-            return self.contested(training, begun, noise);
-        }
-        if self.options.rough {
-            return self.again(&middle_of(training), begun);
-        }
-        self.finished(training, begun)
+    }
+
+    /// Hyper-parameters of a fit to nearly the same rows, which outliers are judged by.
+    fn begun(
+        &mut self,
+        training: &mut Training,
+        start: &Start,
+        noise: [f64; 2],
+    ) -> Result<Hyper, FieldError> {
+        self.evidence = start.evidence;
+        self.judged_by_part(training, start.hyper.clone(), noise)
     }
 
     /// Hyper-parameters from nothing but the rows.
@@ -346,7 +385,7 @@ impl Search<'_> {
         mut hyper: Hyper,
         noise: [f64; 2],
     ) -> Result<Hyper, FieldError> {
-        let known = self.options.hyper.is_some() || self.options.near.is_some();
+        let known = self.options.begin.found().is_some();
         let rounds = if training.row_count() > ROWS_AT_ONCE { REWEIGHTINGS } else { 0 };
         for _ in 0..rounds {
             let chosen = evenly(training, ROWS_FOR_POLISH, 0);
@@ -386,7 +425,7 @@ impl Search<'_> {
 
     /// Hyper-parameters without what outliers made of them: waves are found again, and all else with them.
     fn cleaned(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
-        if self.options.hyper.is_some() {
+        if !self.options.begin.searches() {
             return Ok(hyper);
         }
         let hyper = self.again(training, hyper)?;

@@ -62,7 +62,7 @@ pub use conservative_fit::{ConservativePlan, Samples};
 pub use drift::{Drift, Left, find_drift};
 pub use drives::Drives;
 pub use error::FieldError;
-pub use fit::{FieldFit, FieldOptions, fit_field, restore};
+pub use fit::{Begin, FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME, Wave};
 pub use joined::shots_of_poses;

@@ -14,8 +14,8 @@ use pyo3::types::PyDict;
 use truearm_bank::{Bank, Compiled, Input, Levers, UPRIGHT};
 use truearm_estimate::Point;
 use truearm_field::{
-    Drives, FieldError, FieldFit as CoreFit, FieldOptions, Posterior as CorePosterior, fit_field as fit,
-    measurement_covariance, restore,
+    Begin, Drives, FieldError, FieldFit as CoreFit, FieldOptions, Posterior as CorePosterior,
+    fit_field as fit, measurement_covariance, restore,
 };
 use truearm_kinematics::Cancel;
 
@@ -65,12 +65,25 @@ impl Options<'_> {
             payloads: self.payloads.clone(),
             feature_values: self.features.as_array().iter().copied().collect(),
             drives: Drives::of(&numbers(&self.coupling), |joint| problem.chain.slides(joint)),
-            hyper: self.hyper.as_ref().map(hyper_from).transpose()?,
-            near: self.near.as_ref().map(|fit| fit.core.start()),
-            contested: self.contested,
+            begin: self.begin()?,
             rough: self.rough,
             cancel,
         })
+    }
+}
+
+impl Options<'_> {
+    fn begin(&self) -> PyResult<Begin> {
+        let near = self.near.as_ref().map(|fit| fit.core.start());
+        match (&self.hyper, near, self.contested) {
+            (None, None, false) => Ok(Begin::Anew),
+            (Some(hyper), None, false) => Ok(Begin::Known(hyper_from(hyper)?)),
+            (None, Some(start), false) => Ok(Begin::Near(start)),
+            (None, Some(start), true) => Ok(Begin::Contested(start)),
+            _ => Err(CoreError::new_err(
+                "hyper, near and contested contradict each other: give hyper alone, near alone, or near and contested",
+            )),
+        }
     }
 }
 
@@ -334,7 +347,7 @@ impl Posterior {
     ) -> PyResult<Self> {
         let values: Vec<f64> = parameters.as_array().iter().copied().collect();
         let mut known = options.core(problem, Cancel::default())?;
-        let Some(hyper) = known.hyper.clone() else {
+        let Begin::Known(hyper) = known.begin.clone() else {
             return Err(CoreError::new_err("a posterior needs the fitted hyper-parameters"));
         };
         let threads = options.threads;

@@ -184,7 +184,8 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         began = time.perf_counter()
         variable = _fit_field(task, measured, constants, data, known)
         if _spoilt(constants.constant, variable):
-            known = replace(known, near=variable, contested=not known.rough)
+            if known.exactly is None:
+                known = replace(known, near=variable, contested=not known.rough)
             constants, variable = _without_outliers(task, data, variable.weights, known)
         if known.exactly is None and not known.rough:
             constants, variable = _unmasked(task, data, (constants, variable))

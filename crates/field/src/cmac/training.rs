@@ -214,6 +214,8 @@ impl Network {
         let left = dispatch(Epoch { network: &mut self, activity: &activity, patterns, update: false });
         let (excited, collisions) = activity.collisions();
         let (largest, rms) = (left.largest(), left.rms());
+        // While weights change, patterns are met before what comes after them does them good.
+        let end = if largest <= options.tolerance { TrainingEnd::Converged } else { end };
         Ok(Trained { network: self, epochs, end, largest, rms, excited, collisions })
     }
 }

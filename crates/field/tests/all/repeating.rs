@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::{Measure, Truth, fit_from, options, problem, scara, six_axes, with_threads};
 use truearm_estimate::Point;
-use truearm_field::{FieldError, FieldFit, Hyper, Posterior, restore};
+use truearm_field::{Begin, FieldError, FieldFit, Hyper, Posterior, restore};
 use truearm_kinematics::{Cancel, Cancelled};
 
 /// Everything that a fit says, as bits.
@@ -51,7 +51,7 @@ fn threads_do_not_change_weight_space() {
     let fits = [1, 2, 4].map(|threads| {
         with_threads(threads, || {
             let (constant, mut options) = options(&arm, &set).unwrap();
-            options.hyper = Some(hyper.clone());
+            options.begin = Begin::Known(hyper.clone());
             let field = fit_from(&arm, &set, constant, options).unwrap().field;
             assert!(matches!(field.posterior, Posterior::Weight(_)));
             bits(&field)
@@ -68,14 +68,14 @@ fn a_fit_that_begins_at_a_rough_one_ends_where_one_from_nothing_does() {
     for poses in [320, 80] {
         let set = Measure::poses(poses).of(&arm);
         let (constant, mut options) = options(&arm, &set).unwrap();
-        let mut fitted = |near, rough| {
-            (options.near, options.rough) = (near, rough);
+        let mut fitted = |begin, rough| {
+            (options.begin, options.rough) = (begin, rough);
             fit_from(&arm, &set, constant.clone(), options.clone()).unwrap().field
         };
-        let whole = fitted(None, false);
-        let rough = fitted(None, true);
+        let whole = fitted(Begin::Anew, false);
+        let rough = fitted(Begin::Anew, true);
         assert!(rough.wide.is_none() && rough.evaluations <= whole.evaluations);
-        let finished = fitted(Some(rough.start()), false);
+        let finished = fitted(Begin::Near(rough.start()), false);
         let [finished, whole] = [finished, whole].map(|field| (bits(&field), field.evaluations));
         assert!(finished.0 == whole.0, "{poses} poses");
         assert_eq!(finished.1 + rough.evaluations, whole.1);
@@ -88,7 +88,7 @@ fn a_restored_posterior_is_as_sure_as_the_fit() {
     let mut set = Measure::poses(60).of(&arm);
     set.targets[3 * 11] += 5e-3;
     let (constant, mut options) = options(&arm, &set).unwrap();
-    options.hyper = Some(Hyper::start(&[1, 2], 6, [3e-5, 1e-4]));
+    options.begin = Begin::Known(Hyper::start(&[1, 2], 6, [3e-5, 1e-4]));
     let start = constant.clone();
     let fit = fit_from(&arm, &set, constant, options).unwrap();
     assert_eq!(fit.field.judgement.outliers, [11]);

@@ -6,7 +6,7 @@ use crate::common::{
 };
 use truearm_bank::Input;
 use truearm_estimate::MeasurementSet;
-use truearm_field::Hyper;
+use truearm_field::{Begin, Hyper};
 
 const NOISE: f64 = 3e-5;
 
@@ -14,7 +14,7 @@ const NOISE: f64 = 3e-5;
 fn check(arm: &Arm, measure: Measure, share: f64) {
     let set = measure.of(arm);
     let (constant, mut options) = options(arm, &set).unwrap();
-    options.hyper = Some(centre(&set));
+    options.begin = Begin::Known(centre(&set));
     let fit = fit_from(arm, &set, constant, options).unwrap();
     let other = Measure { seed: 99, poses: 200, ..measure }.of(arm);
     let (constant, field) = deviations(arm, &fit, &other);
@@ -81,7 +81,7 @@ fn targets_that_were_not_seen_are_done_without() {
         set.targets[at..at + 3].fill(f64::NAN);
     }
     let (constant, mut options) = options(&arm, &set).unwrap();
-    options.hyper = Some(centre(&set));
+    options.begin = Begin::Known(centre(&set));
     let fit = fit_from(&arm, &set, constant, options).unwrap();
     let missing = set.targets.iter().filter(|x| x.is_nan()).count();
     assert_eq!(fit.field.posterior.training().row_count(), 6 * 80 - missing);
@@ -99,7 +99,7 @@ fn a_feature_that_matters_is_an_input() {
     }
     let error = |features: bool| {
         let (constant, mut options) = options(&arm, &set).unwrap();
-        options.hyper = Some(centre(&set));
+        options.begin = Begin::Known(centre(&set));
         if features {
             options.features = vec![Input::line(15.0)];
             options.feature_values = warmth.clone();

@@ -4,7 +4,7 @@ use truearm_estimate::{
     ConstantFit, ConstantOptions, FrameMode, MeasurementSet, Point, Prior, Problem, fit_constant,
     identifiability, residuals,
 };
-use truearm_field::{FieldError, FieldFit, FieldOptions, fit_field};
+use truearm_field::{Begin, FieldError, FieldFit, FieldOptions, fit_field};
 use truearm_kinematics::Cancel;
 
 use super::Arm;
@@ -41,9 +41,7 @@ pub fn options(arm: &Arm, set: &MeasurementSet) -> Result<(ConstantFit, FieldOpt
         payloads: Vec::new(),
         feature_values: Vec::new(),
         drives: None,
-        hyper: None,
-        near: None,
-        contested: false,
+        begin: Begin::Anew,
         rough: false,
         cancel: Cancel::default(),
     };

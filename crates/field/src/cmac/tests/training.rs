@@ -65,6 +65,20 @@ fn training_converges_to_the_tolerance_it_reports() {
 }
 
 #[test]
+fn what_is_within_the_tolerance_has_converged_whatever_ended_training() {
+    let network = network(&[12, 12], 3, 2, GAUSSIAN);
+    let s = inputs(60, 2);
+    let trained = |tolerance: f64| {
+        let how = TrainingOptions { tolerance, ..options(Rate::Printed(1.0), 40) };
+        network.train((&s, &smooth(&s)), &LENGTHS, &how).unwrap()
+    };
+    let cut = trained(1e-9);
+    assert_eq!((cut.end, cut.epochs), (TrainingEnd::EpochLimit, 40));
+    let met = trained(cut.largest);
+    assert_eq!((met.end, met.epochs, met.largest), (TrainingEnd::Converged, 40, cut.largest));
+}
+
+#[test]
 fn contradictions_stall_and_the_limit_of_epochs_is_said() {
     let network = network(&[6, 6], 3, 2, GAUSSIAN);
     let (s, wanted) = ([0.5, 0.5, 0.5, 0.5], [1e-3, 0.0, -1e-3, 0.0]);
