@@ -21,6 +21,16 @@ are in rad and lengths in m where no unit is in a name. Shapes are in parenthese
 """
 MODULES = {
     "truearm": (),
+    "truearm.judgement.validation": ("Validation", "Errors", "Statistics", "RowErrors"),
+    "truearm.judgement.held_rows": ("HeldRows",),
+    "truearm.fits.details": ("ConstantDetails", "VariableDetails", "DriftDetails", "Jump"),
+    "truearm.fits.known_scale": ("KnownScale",),
+    "truearm.fits.identifiability": ("Identifiability",),
+    "truearm.fits.fitted_rows": ("FittedRows",),
+    "truearm.updating.moved": ("Offset", "Motion"),
+    "truearm.updating.squares": ("SquaresTest",),
+    "truearm.programs.program": ("Listed",),
+    "truearm.programs.densify": ("Spacing",),
     "truearm.fits.scheme_options": ("SchemeOptions",),
     "truearm.simulation": ("VirtualArm", "Imperfections"),
     "truearm.inverse": ("Inverse",),
@@ -37,7 +47,7 @@ MODULES = {
 INTERNAL = "Internal:"
 MADE = re.compile(r"^`.*` makes? one\b", re.MULTILINE)
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$")
-ITEM = re.compile(r"^ {4}(\*{0,2}[\w., ]+): (.*)$")
+ITEM = re.compile(r"^ {4}(\*{0,2}\w+(?:, \*{0,2}\w+)*): (.*)$")
 STARS: dict[Any, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
 ROLE = re.compile(r":\w+:`~?\.?([^`]+)`")
 

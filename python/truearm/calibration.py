@@ -331,7 +331,7 @@ class Calibration:
 
         Raises:
             WorkError: If a pose is not reached within the joint limits, or on another branch than the seed's.
-            InputError: If targets, seed or tool are none.
+            InputError: If targets, seed or tool are not finite numbers of these shapes, or not rigid.
         """
         return solve(self, base_from_tool, seed, tool=tool, task=task, features=features)
 

@@ -18,6 +18,7 @@ from truearm._core import Chain, Conservative
 from truearm.fits.fitting import feature_values
 
 if TYPE_CHECKING:
+    from truearm._core import BoundsPlan
     from truearm.calibration import Calibration
     from truearm.robot import Robot
 
@@ -104,7 +105,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     (fitted, prior), (fresh, _) = (_exact(calibration, centre, reach.draw(count, rng)) for _ in range(2))
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot
-    plan = {
+    plan: BoundsPlan = {
         "angles": robot.revolute.tolist() + [False] * len(calibration.options.features),
         "ranges": _input_ranges(robot, reach.limits),
         "together": list(range(min(TOGETHER, robot.joint_count))),

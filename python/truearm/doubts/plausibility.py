@@ -261,7 +261,7 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
             rule="Positions are in metres unless their columns say so (x_mm)",
             way_out=_way_out_of_large(measured, nominal),
         )
-    if _could_be_radians(group, robot) and measured > 3.0 * nominal + TOOL_ALLOWANCE_M:
+    if _could_be_radians(group) and measured > 3.0 * nominal + TOOL_ALLOWANCE_M:
         raise InputError(
             found,
             where=where,
@@ -343,7 +343,7 @@ def _way_out_of_large(measured: float, nominal: float, columns: str = "x_mm, y_m
     return "Check the columns and their unit"
 
 
-def _could_be_radians(group: Measurements, robot: Robot) -> bool:
+def _could_be_radians(group: Measurements) -> bool:
     degrees = np.array(group.joint_units) == "deg"
     values = group.readings[:, degrees] / RADIANS_PER_DEGREE
     return bool(degrees.any()) and bool((np.abs(values) <= FULL_TURN).all())

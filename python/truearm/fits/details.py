@@ -55,7 +55,7 @@ class ConstantDetails:
         standard_errors: Floats,
         scale: KnownScale,
     ) -> "ConstantDetails":
-        """Those of a fit."""
+        """Internal: those of a fit."""
         noise_m, noise_rad = fit.noise
         return cls(
             names=names,

@@ -38,7 +38,7 @@ class FittedRows:
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
             orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
             pair once.
-        score: Squared standardised residuals over the limit (n,); above one is an outlier.
+        score: Squared standardised residuals over their limit (n,); above one is an outlier.
         distance_m: How far the farthest target of each row is from where the model has it (n,). A distance is
             off by so much in its row, in both of a pair; those of a calibration are judged by constants that
             rows far off do not bend, as are their scores.
@@ -67,7 +67,7 @@ class FittedRows:
 
     @classmethod
     def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":
-        """The rows of a fit; `side` (n,) in their order."""
+        """Internal: the rows of a fit; `side` (n,) in their order."""
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)

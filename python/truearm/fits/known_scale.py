@@ -32,7 +32,7 @@ class KnownScale:
     def of(
         cls, residual: Floats, rank: int, stated: Floats | None, common: float, widened: float = 1.0
     ) -> "KnownScale":
-        """That of residuals, zero where not measured, with `rank` unknowns and stated sigmas (n,), m."""
+        """Internal: that of residuals, zero where not measured, `rank` unknowns and stated sigmas (n,), m."""
         told = np.empty(0) if stated is None else stated[np.isfinite(stated)]
         usual = float(np.median(told)) if len(told) else 0.0
         return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)

@@ -96,8 +96,8 @@ def accessible(
         tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
 
     Raises:
-        InputError: If the readings are none, a rule answers with another shape than (n,), or the tool is
-            none.
+        InputError: If readings or tool are not finite numbers of these shapes, or a rule answers with another
+            shape than (n,).
     """
     poses, _ = as_rows(readings, robot.joint_count, what=f"joint readings of {robot.name}")
     flange_from_tool = at_tool(robot, tool)

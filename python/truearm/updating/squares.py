@@ -35,7 +35,7 @@ class SquaresTest:
 
     @classmethod
     def of(cls, values: Floats, freedom: int, known: int) -> "SquaresTest":
-        """That of standardised values (k,), whose scale is known from `known` degrees of freedom."""
+        """Internal: that of standardised values (k,), whose scale `known` degrees of freedom tell."""
         squares = float(np.square(values).sum())
         return cls(squares, freedom, float(fdtrc(freedom, known, squares / freedom)) if freedom else 1.0)
 
