@@ -24,7 +24,7 @@ from truearm.fits.identifiability import Identifiability
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import CONSTANT, ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.inputs import Features, feature_columns
 from truearm.judgement.held_rows import HeldRows
@@ -80,7 +80,7 @@ class Calibration:
     """
 
     robot: Robot
-    options: Options
+    options: CalibrationOptions
     groups: tuple[str, ...]
     selection: Selection
     measured: MeasuredParts

@@ -24,7 +24,7 @@ from truearm.fits.enough_values import check_enough, check_set_ups, setup_unknow
 from truearm.fits.identifiability import Identifiability, identify
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.fits.schemes import SCHEMES
 from truearm.inputs import is_payload
@@ -96,7 +96,7 @@ class Task:
     arm: IdentifiedArm
     selection: Selection
     groups: Sequence[str]
-    options: Options
+    options: CalibrationOptions
     threads: int | None = None
     stages: Stages = no_stages
     sizes: tuple[int, ...] = ()

@@ -12,7 +12,7 @@ from truearm._core import Network, Regions, Training, fill_without_data, lineari
 from truearm.fits.core_set import Selection
 from truearm.fits.fitting import Hyper, KnownHyper, Task, fit_rows
 from truearm.fits.models import VARIABLE
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.schemes import add_ceps, training_pairs
 from truearm.measurements import Measurements
 from truearm.studies.experiment import Experiment
@@ -98,7 +98,7 @@ def measured_schemes(made: Experiment, kept: Kept) -> dict[str, Scheme]:
 
 def variable_scheme(made: Experiment, kept: Kept) -> Scheme:
     """Our variable model with the base as a row, as `truearm calibrate --frame world` fits it."""
-    task = Task(made.identified, Selection((0,)), ("measured",), Options(frame="world"))
+    task = Task(made.identified, Selection((0,)), ("measured",), CalibrationOptions(frame="world"))
     columns = {f"q{j + 1}": made.readings[:, j] for j in range(made.readings.shape[1])}
     columns |= dict(zip("xyz", made.points.T, strict=True))
     data = Measurements.from_dataframe(pd.DataFrame(columns | {"group": "measured"}))
