@@ -1,6 +1,6 @@
 """Write docs/reference/python-docstrings.md from the docstrings of what is public.
 
-Members whose docstring begins with "Internal:" are left out, as they are of truearm's other modules. A class
+Members and attributes whose docstring begins with "Internal:" are left out, as other modules are. A class
 that says what makes one, in a line such as "`update` makes one.", is not shown as a call.
 """
 
@@ -127,7 +127,7 @@ def _markdown(thing: Any) -> str:
         return "A record of its arguments.\n"
     lines: list[str] = []
     section = ""
-    for line in ROLE.sub(r"`\1`", inspect.getdoc(thing) or "").splitlines():
+    for line in _shown_lines(ROLE.sub(r"`\1`", inspect.getdoc(thing) or "")):
         head = SECTION.match(line)
         item = ITEM.match(line) if section in ("Args", "Attributes", "Raises") else None
         if head:
@@ -141,6 +141,17 @@ def _markdown(thing: Any) -> str:
             section = "" if line.strip() else section
             lines.append(line)
     return "\n".join(lines) + "\n"
+
+
+def _shown_lines(text: str) -> Iterator[str]:
+    """The lines of a docstring without items that begin with "Internal:"."""
+    hidden = False
+    for line in text.splitlines():
+        item = ITEM.match(line)
+        if item or not line.startswith(" " * 5):
+            hidden = bool(item) and item[2].startswith(INTERNAL)
+        if not hidden:
+            yield line
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.doubts.mixed_units import check_mixed_units
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows, spread_m
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows
 from truearm.doubts.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.doubts.unit_change import check_one_unit
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
+from truearm.registration import spread_m
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
 from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE

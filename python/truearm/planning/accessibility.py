@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_CONTACT_DEG: Final = 15.0
-UPRIGHT: Final = np.cos(np.deg2rad(1.0))
+UPRIGHT_COSINE: Final = np.cos(np.deg2rad(1.0))
 LEVEL: Final = np.sin(np.deg2rad(1.0))
 """Cosines to the vertical of axes that are taken for vertical and for level."""
 
@@ -74,7 +74,7 @@ def standing_links(robot: Robot) -> int:
     count = 0
     for axis in axes:
         up = abs(float(axis.direction_in_base[2]))
-        if not (up > UPRIGHT if axis.kind == "revolute" else up < LEVEL):
+        if not (up > UPRIGHT_COSINE if axis.kind == "revolute" else up < LEVEL):
             break
         count += 1
     return max(1, count)
