@@ -149,7 +149,7 @@ def _shown_lines(text: str) -> Iterator[str]:
     for line in text.splitlines():
         item = ITEM.match(line)
         if item or not line.startswith(" " * 5):
-            hidden = bool(item) and item[2].startswith(INTERNAL)
+            hidden = item is not None and item[2].startswith(INTERNAL)
         if not hidden:
             yield line
 

@@ -31,6 +31,8 @@ OVERWHELMING: Final = 1e-6
 class FittedRows:
     """n rows in the order they were fitted in.
 
+    `truearm.calibrate` makes one, `calibration.rows`.
+
     Attributes:
         data: What was measured.
         side: For each row (n,) whether it was UNUSED, TRAINED or HELD_OUT when the errors were judged.

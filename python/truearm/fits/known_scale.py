@@ -12,6 +12,8 @@ Floats = NDArray[np.float64]
 class KnownScale:
     """What an update compares new rows with; it stays what it was when the calibration is updated.
 
+    `truearm.calibrate` makes one, `calibration.constant.scale`.
+
     Attributes:
         freedom: Degrees of freedom that the scale of standard deviations is known from.
         sigma_m: What half of the rows state as their sigma, or less, m; zero where none does, None in files

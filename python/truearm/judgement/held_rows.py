@@ -26,6 +26,8 @@ FEWEST_POSES: Final = 2
 class HeldRows:
     """n rows and what each model missed there. The error of a pair's distance is at the first of its rows.
 
+    `truearm.calibrate` makes one, `calibration.held`; `truearm.evaluate` another, `evaluation.rows`.
+
     Attributes:
         readings: Joint readings (n, N), rad or m.
         rows: Number of each row in its file (n,), the first data row being 1.

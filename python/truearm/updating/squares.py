@@ -23,6 +23,8 @@ NEGLIGIBLE: Final = 1e-2
 class SquaresTest:
     """A sum of squares in units of a scale that the calibration's own rows told, hence F distributed.
 
+    `truearm.update` makes one of what may have moved, `update.changed`, and of what is left, `update.rest`.
+
     Attributes:
         squares: The sum.
         freedom: Degrees of freedom.
