@@ -150,9 +150,8 @@ def test_a_calibration_with_numbers_of_numpy_is_saved(arm, data, tmp_path):
 
 
 def test_names_are_one_text_or_several():
-    assert ta.CalibrationOptions(features="load, warmth") == ta.CalibrationOptions(
-        features=("load", "warmth")
-    )  # type: ignore[arg-type]
+    options = ta.CalibrationOptions(features="load, warmth")  # type: ignore[arg-type]
+    assert options == ta.CalibrationOptions(features=("load", "warmth"))
     assert ta.SplitRule(split_by=["a", "b"]) == ta.SplitRule(split_by="a,b")  # type: ignore[arg-type]
 
 
