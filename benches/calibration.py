@@ -3,6 +3,7 @@
 import json
 import sys
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def ours(model):
     """The problem in the core's own terms, and a call that fits it."""
     robot = Robot.load("ur10")
     n = len(model.joints)
-    arrays = {
+    arrays: Any = {
         "joints": model.joints,
         "group": np.zeros(n, dtype=np.int64),
         "targets": model.measured[:, None, :],
@@ -81,7 +82,7 @@ def ours(model):
         model.world_from_base[None], model.point[None, None], np.eye(3)[None], np.empty((0, 3))
     )
     given = _core.Problem(robot.flange_chain, _core.MeasurementSet(arrays), model.columns)
-    options = {
+    options: Any = {
         "prior": None,
         "noise": (NOISE_M, 1.0),
         "robust": None,

@@ -4,6 +4,7 @@ import json
 import sys
 from functools import cache
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def corrector():
     chain = _core.Chain("standard", ["revolute"] * 6, TABLE, np.eye(4), np.eye(4))
     programming = _core.ArmModel(chain, TABLE, np.eye(6))
     calibrated = _core.ArmModel(chain, true_table(), np.eye(6))
-    options = {"task": "pose", "moving": None, "joints": np.empty((0, 2))}
+    options: Any = {"task": "pose", "moving": None, "joints": np.empty((0, 2))}
     return _core.Corrector(calibrated, programming, END, options | dict.fromkeys(BOUNDS, np.inf))
 
 

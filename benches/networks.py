@@ -3,6 +3,7 @@
 import json
 import sys
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ SAME = 1e-12
 @cache
 def network():
     sensors = [(LOW[k], HIGH[k], CELLS[k], ACTIVE) for k in range(3)]
-    options = {"membership": "gaussian", "sigma": SIGMA, "composition": "min", "table": None}
+    options: Any = {"membership": "gaussian", "sigma": SIGMA, "composition": "min", "table": None}
     empty = _core.Network(sensors, OUTPUTS, options)
     return empty.with_weights(np.random.default_rng(0).normal(size=(empty.table_size, OUTPUTS)))
 

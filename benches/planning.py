@@ -3,6 +3,7 @@
 import json
 import sys
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,7 @@ def pool():
 
 def choose():
     jacobian, columns = pool()
-    options = {
+    options: Any = {
         "columns": columns,
         "criterion": "d",
         "limit": None,
@@ -80,7 +81,7 @@ class VirtualRvM2:
         return np.hstack([features, np.zeros((count, 2))]), features
 
     def measure(self, q):
-        arrays = {
+        arrays: Any = {
             "joints": q,
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": self.measured.position(q, self.true)[:, None],
@@ -92,7 +93,7 @@ class VirtualRvM2:
         return _core.MeasurementSet(arrays)
 
     def divide(self):
-        options = {
+        options: Any = {
             "low": LOW,
             "high": HIGH,
             "accuracy": 0.0,
@@ -103,7 +104,7 @@ class VirtualRvM2:
             "limit": 2000.0,
             "seed": 0,
         }
-        measuring = {
+        measuring: Any = {
             "candidates": DRAWN,
             "tests": TESTS,
             "criterion": "kappa",

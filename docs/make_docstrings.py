@@ -1,6 +1,6 @@
 """Write docs/reference/python-docstrings.md from the docstrings of what is public.
 
-Members whose docstring begins with "Internal:" are left out, as they are of truearm's other modules. A class
+Members and attributes whose docstring begins with "Internal:" are left out, as other modules are. A class
 that says what makes one, in a line such as "`update` makes one.", is not shown as a call.
 """
 
@@ -21,6 +21,16 @@ are in rad and lengths in m where no unit is in a name. Shapes are in parenthese
 """
 MODULES = {
     "truearm": (),
+    "truearm.judgement.validation": ("Validation", "Errors", "Statistics", "RowErrors"),
+    "truearm.judgement.held_rows": ("HeldRows",),
+    "truearm.fits.details": ("ConstantDetails", "VariableDetails", "DriftDetails", "Jump"),
+    "truearm.fits.known_scale": ("KnownScale",),
+    "truearm.fits.identifiability": ("Identifiability",),
+    "truearm.fits.fitted_rows": ("FittedRows",),
+    "truearm.updating.moved": ("Offset", "Motion"),
+    "truearm.updating.squares": ("SquaresTest",),
+    "truearm.programs.program": ("Listed",),
+    "truearm.programs.densify": ("Spacing",),
     "truearm.fits.scheme_options": ("SchemeOptions",),
     "truearm.simulation": ("VirtualArm", "Imperfections"),
     "truearm.inverse": ("Inverse",),
@@ -37,7 +47,7 @@ MODULES = {
 INTERNAL = "Internal:"
 MADE = re.compile(r"^`.*` makes? one\b", re.MULTILINE)
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$")
-ITEM = re.compile(r"^ {4}(\*{0,2}[\w., ]+): (.*)$")
+ITEM = re.compile(r"^ {4}(\*{0,2}\w+(?:, \*{0,2}\w+)*): (.*)$")
 STARS: dict[Any, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
 ROLE = re.compile(r":\w+:`~?\.?([^`]+)`")
 
@@ -117,7 +127,7 @@ def _markdown(thing: Any) -> str:
         return "A record of its arguments.\n"
     lines: list[str] = []
     section = ""
-    for line in ROLE.sub(r"`\1`", inspect.getdoc(thing) or "").splitlines():
+    for line in _shown_lines(ROLE.sub(r"`\1`", inspect.getdoc(thing) or "")):
         head = SECTION.match(line)
         item = ITEM.match(line) if section in ("Args", "Attributes", "Raises") else None
         if head:
@@ -131,6 +141,17 @@ def _markdown(thing: Any) -> str:
             section = "" if line.strip() else section
             lines.append(line)
     return "\n".join(lines) + "\n"
+
+
+def _shown_lines(text: str) -> Iterator[str]:
+    """The lines of a docstring without items that begin with "Internal:"."""
+    hidden = False
+    for line in text.splitlines():
+        item = ITEM.match(line)
+        if item or not line.startswith(" " * 5):
+            hidden = item is not None and item[2].startswith(INTERNAL)
+        if not hidden:
+            yield line
 
 
 if __name__ == "__main__":

@@ -53,12 +53,12 @@ from truearm.cell.cell_file import ProcessSection
 from truearm.cell.measuring import DONE, Process
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
-from truearm.cell.running import INTERRUPTED
 from truearm.cell.session import Session
 from truearm.cell.table_panel import SENDINGS
 from truearm.cell.virtual.launch import TIMES, VirtualCell
 from truearm.cell.virtual.state import COLLISIONS
 from truearm.errors import WorkError
+from truearm.interrupts import INTERRUPTED
 
 MESSAGE_FAULTS = ("lost", "delayed", "duplicated", "garbled")
 CONTACT_FAULTS = ("missed", "outlier")

@@ -29,7 +29,7 @@ def arm():
 def folder(tmp_path_factory, arm):
     place = tmp_path_factory.mktemp("compensate")
     measured = arm.measure(arm.poses(60, seed=1), orientation=True)
-    ta.calibrate(ABB, measured, ta.Options.of(model="constant")).save(place / "arm.calib")
+    ta.calibrate(ABB, measured, ta.CalibrationOptions.of(model="constant")).save(place / "arm.calib")
     (place / "demo.mod").write_bytes(module(BODY, points()).encode("latin-1"))
     return place
 
@@ -250,7 +250,7 @@ def test_a_directory_takes_files_of_the_same_names(arm):
 
 def test_refusals_of_positions_alone_name_the_tool(arm, capsys):
     table = arm.measure(arm.poses(60, seed=1))
-    ta.calibrate(ABB, table, ta.Options.of(model="constant")).save(Path("points.calib"))
+    ta.calibrate(ABB, table, ta.CalibrationOptions.of(model="constant")).save(Path("points.calib"))
     np.savetxt("path.csv", arm.poses(3, seed=5), delimiter=",", header="q1,q2,q3,q4,q5,q6", comments="")
     command = ["compensate", "points.calib", "path.csv", "--controller", "nominal", "-o", "out.csv"]
     assert main([*command, "--largest-std-mm", "1e-4"]) == 1

@@ -1,5 +1,7 @@
 """What the core does with measurements that no reader of files lets through."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -36,7 +38,7 @@ def measured(q, **more):
     count = len(q)
     points = pose[:, :3, :3] @ TARGET + pose[:, :3, 3]
     points += np.random.default_rng(1).normal(scale=1e-5, size=points.shape)
-    content = {
+    content: Any = {
         "joints": np.ascontiguousarray(q),
         "group": np.zeros(count, dtype=np.int64),
         "targets": points[:, None],
@@ -45,7 +47,7 @@ def measured(q, **more):
         "weight": np.ones(count),
         "distances": [],
     }
-    return MeasurementSet({**content, **more})
+    return MeasurementSet(content | more)
 
 
 def drawn(count):
@@ -53,7 +55,7 @@ def drawn(count):
 
 
 def constants(problem):
-    options = {
+    options: Any = {
         "prior": PRIOR,
         "noise": None,
         "robust": None,
@@ -65,7 +67,7 @@ def constants(problem):
 
 
 def field(problem, count, **more):
-    options = {
+    options: Any = {
         "determined": list(range(len(COLUMNS))),
         "driven": list(range(len(COLUMNS))),
         "features": np.zeros((count, 0)),
@@ -80,7 +82,7 @@ def field(problem, count, **more):
         "rough": False,
         "threads": None,
     }
-    return fit_field(problem, constants(problem), {**options, **more})
+    return fit_field(problem, constants(problem), options | more)
 
 
 @pytest.mark.parametrize("part", [np.zeros((3, 3)), 2.0 * np.eye(3), np.diag([1.0, 1.0, -1.0])])

@@ -19,7 +19,7 @@ FIXTURES = Path(__file__).resolve().parents[2] / "shared" / "reference" / "rv_m2
 
 
 def network(outputs: int = 15, c: int = 3, **given: Any) -> _core.Network:
-    options = {"membership": "gaussian", "sigma": 0.5, "composition": "min", "table": None, **given}
+    options: Any = {"membership": "gaussian", "sigma": 0.5, "composition": "min", "table": None, **given}
     return _core.Network([(LOW[k], HIGH[k], CELLS[k], c) for k in range(3)], outputs, options)
 
 
@@ -71,7 +71,7 @@ def test_outputs_are_those_of_the_appendix() -> None:
 def test_the_cmac_jumps_where_the_fcmac_does_not() -> None:
     path = np.linspace(LOW, HIGH, 4000)
     wanted = 1e-3 * np.sin(path[::40] @ [1.0, 0.7, 0.4])[:, None]
-    options = {"columns": [1], "rate": 1.0, "normalise": "printed", "tolerance": 1e-6, "epochs": 2000}
+    options: Any = {"columns": [1], "rate": 1.0, "normalise": "printed", "tolerance": 1e-6, "epochs": 2000}
 
     def largest_jump(membership: str) -> float:
         made = network(outputs=1, membership=membership).train(path[::40], wanted, options).network
@@ -112,7 +112,7 @@ class SixAxes:
         true[:, 10] += 1e-3 * np.cos(q[:, 2])
         true[:, 6] += 4e-4
         pose = self.chain.pose(q, true.reshape(len(q), -1, 5))
-        arrays = {
+        arrays: Any = {
             "joints": q,
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": np.ascontiguousarray(pose[:, None, :3, 3]),
@@ -131,10 +131,10 @@ def test_six_inputs_with_orientation_learn_in_a_hash_table() -> None:
     q, features = arm.poses(1500, 1)
     low, high = features.min(0), features.max(0)
     sensors = [(low[k], high[k], 9, 3) for k in range(6)]
-    shape = {"membership": "gaussian", "sigma": 0.5, "composition": "min", "table": 60_000}
+    shape: Any = {"membership": "gaussian", "sigma": 0.5, "composition": "min", "table": 60_000}
     empty = _core.Network(sensors, len(arm.COLUMNS), shape)
     assert (empty.cell_count, empty.table_size, empty.active_count) == (9**6, 60_000, 729)
-    options = {
+    options: Any = {
         "columns": list(arm.COLUMNS),
         "rate": 1.0,
         "normalise": "squares",

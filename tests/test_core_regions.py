@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 NAMES = ("theta", "d", "a", "alpha", "beta")
 COLUMNS = [5 * int(name[-1]) + NAMES.index(name[:-1]) for name in PAPER_PARAMETERS]
 LOW, HIGH = np.deg2rad([[-150.0, -30.0, -120.0], [150.0, 100.0, 0.0]])
-OPTIONS: dict[str, Any] = {
+OPTIONS: Any = {
     "low": LOW,
     "high": HIGH,
     "accuracy": 0.0,
@@ -30,7 +30,7 @@ OPTIONS: dict[str, Any] = {
     "limit": 2000.0,
     "seed": 1,
 }
-MEASURING: dict[str, Any] = {
+MEASURING: Any = {
     "candidates": 150,
     "tests": 10,
     "criterion": "d",
@@ -66,7 +66,7 @@ class Arm:
     def measure(self, q: Floats) -> _core.MeasurementSet:
         self.measured.append(q)
         points = self.points(q) + self.noise * self.rng.normal(size=(len(q), 3))
-        arrays: dict[str, Any] = {
+        arrays: Any = {
             "joints": q,
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": points[:, None],
@@ -212,7 +212,7 @@ def test_shrunk_ceps_withstand_noise() -> None:
     regions = _core.Regions(LOW, HIGH).evenly(64)
 
     def estimate(method: str) -> _core.RegionalFit:
-        options = {"method": method, "prior": None}
+        options: Any = {"method": method, "prior": None}
         return _core.regional_ceps(regions, problem, arm.table, arm.setup, features, options)
 
     alone, shrunk = estimate("least_squares"), estimate("shrunk")
@@ -247,7 +247,7 @@ def test_chosen_poses_are_better_than_any_and_the_limit_is_judged() -> None:
     arm = Arm()
     problem, _ = recorded(arm, 400)
     jacobian, _ = _core.linearise(problem, arm.table, arm.setup)
-    options = {"columns": COLUMNS, "limit": 20.0, "given": None, "start": None, "passes": 20}
+    options: Any = {"columns": COLUMNS, "limit": 20.0, "given": None, "start": None, "passes": 20}
     for criterion in ("kappa", "d", "o1", "o2", "o3", "o4", "o5"):
         choice = _core.choose_poses(jacobian, 20, options | {"criterion": criterion})
         assert choice.after["kappa"] < 20.0 < choice.before["kappa"]

@@ -343,6 +343,8 @@ def test_the_python_reference_shows_only_what_is_for_calls():
     assert not re.search(r"^#### \w+\.(core|corrector|values_of|field_inputs)$", text, re.MULTILINE)
     assert ("`Calibration(" in text, "`Robot(" in text, "`Limits(" in text) == (False, False, True)
     assert "Internal" not in text
+    items = re.findall(r"^- `([^`]+)`: ", text, re.MULTILINE)
+    assert [item for item in items if re.search(r"[^,] ", item)] == []
 
 
 def load_script(name):

@@ -36,7 +36,7 @@ def test_shots_of_too_few_poses_are_refused_with_the_poses_that_are_needed(arm):
 
 def counted(data):
     arm = IdentifiedArm(UR10, "free", 5.0)
-    return measured_values(Task(arm, select(data, None), data.groups, ta.Options()), data)
+    return measured_values(Task(arm, select(data, None), data.groups, ta.CalibrationOptions()), data)
 
 
 def test_values_of_a_pose_count_once_whatever_was_measured(arm):

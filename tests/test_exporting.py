@@ -22,7 +22,7 @@ from truearm.cli import main
 from truearm.controller import Controller
 from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.exporting import FORMATS, Options, constant_robot, export
+from truearm.exporting import FORMATS, ExportOptions, constant_robot, export
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.exporting.urdf_file import comment
 from truearm.simulation import VirtualArm
@@ -213,7 +213,7 @@ def test_the_command_that_is_named_after_correcting_a_urdf_works(hand_made, tmp_
 
 def test_a_corrected_urdf_keeps_all_but_the_chain(hand_made):
     path, calibration = hand_made
-    made = export(calibration, "urdf", options=Options(urdf=f"{path}#mount"))
+    made = export(calibration, "urdf", options=ExportOptions(urdf=f"{path}#mount"))
     robot = constant_robot(calibration)
     again = Robot.from_urdf_text(made.text, "world", "mount")
     q = random_readings(robot)
@@ -236,11 +236,11 @@ def test_a_corrected_urdf_keeps_the_names_of_other_programs(hand_made, tmp_path)
     odd = odd.replace("</robot>", '<gz:plugin gz:file="a.so"><drake:gear ratio="80"/></gz:plugin></robot>')
     other = tmp_path / "odd.urdf"
     other.write_text(odd)
-    made = export(calibration, "urdf", options=Options(urdf=f"{other}#mount"))
+    made = export(calibration, "urdf", options=ExportOptions(urdf=f"{other}#mount"))
     for kept in ('xmlns:gz="http://gz"', '<gz:plugin gz:file="a.so">', '<drake:gear ratio="80" />'):
         assert kept in made.text
     assert made.text.count('drake:acceleration="9"') == 3
-    plain = export(calibration, "urdf", options=Options(urdf=f"{path}#mount")).text
+    plain = export(calibration, "urdf", options=ExportOptions(urdf=f"{path}#mount")).text
     assert origins_of(re.sub("(drake|gz):", "", made.text)) == origins_of(plain)
 
 
@@ -259,7 +259,7 @@ def test_a_tip_on_the_last_axis_cannot_hold_a_tilted_flange(hand_made):
     path, _ = hand_made
     calibration = calibrated(Robot.load(f"{path}#finger"))
     robot = constant_robot(calibration)
-    options = Options(urdf=f"{path}#finger")
+    options = ExportOptions(urdf=f"{path}#finger")
     if np.abs(robot.table[5, [2, 3]] - calibration.robot.table[5, [2, 3]]).max() == 0.0:
         assert export(calibration, "urdf", options=options).difference_m == pytest.approx(0.0, abs=1e-9)
     tilted = bent_at_the_end(calibration)
@@ -280,15 +280,15 @@ def bent_at_the_end(calibration):
 def test_another_urdf_is_not_corrected(hand_made, ur10, tmp_path):
     path, calibration = hand_made
     with pytest.raises(InputError, match="differs from UR10 by"):
-        export(ur10, "urdf", options=Options(urdf=f"{path}#mount"))
+        export(ur10, "urdf", options=ExportOptions(urdf=f"{path}#mount"))
     with pytest.raises(InputError, match="has 3 joints that move, hand made has 6"):
-        export(calibration, "urdf", options=Options(urdf=f"{path}#fore"))
+        export(calibration, "urdf", options=ExportOptions(urdf=f"{path}#fore"))
     with pytest.raises(InputError, match="this is no URDF"):
-        export(ur10, "urdf", options=Options(urdf="ur10"))
+        export(ur10, "urdf", options=ExportOptions(urdf="ur10"))
 
 
 def test_ur_yaml_is_what_the_drivers_description_makes_of_it(ur10):
-    made = export(ur10, "ur-yaml", options=Options(kinematics_hash="calib_7"))
+    made = export(ur10, "ur-yaml", options=ExportOptions(kinematics_hash="calib_7"))
     kinematics = yaml.safe_load(made.text)["kinematics"]
     assert kinematics.pop("hash") == "calib_7"
     assert list(kinematics) == ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"]
@@ -374,7 +374,9 @@ def test_a_lost_field_is_said_with_what_it_costs(variable, ur10):
 
 def test_samples_are_the_calibration_at_their_readings(variable, tmp_path):
     path = tmp_path / "field.csv"
-    made = export(variable, "field-csv", path, Options(grid="q2=-90:0:4,q3=0:90:3,q5=30", with_std=True))
+    made = export(
+        variable, "field-csv", path, ExportOptions(grid="q2=-90:0:4,q3=0:90:3,q5=30", with_std=True)
+    )
     table = pd.read_csv(path, comment="#")
     assert made.rows == len(table) == 12
     q = np.radians(table[[f"q{j}_deg" for j in range(1, 7)]].to_numpy())
@@ -391,7 +393,7 @@ def test_samples_are_the_calibration_at_their_readings(variable, tmp_path):
 
 
 def test_samples_say_where_they_were_taken_and_what_their_columns_are(variable):
-    made = export(variable, "field-csv", options=Options(grid="q2=-90:0:4,q5=30", with_std=True))
+    made = export(variable, "field-csv", options=ExportOptions(grid="q2=-90:0:4,q5=30", with_std=True))
     comments = " ".join(line[2:] for line in made.text.splitlines() if line.startswith("#"))
     assert "q2 from -90 to 0 deg, 4 readings; q3 = " in comments
     assert "q5 = 30 deg" in comments
@@ -399,7 +401,7 @@ def test_samples_say_where_they_were_taken_and_what_their_columns_are(variable):
     for name in header[6:14]:
         assert name in comments
     assert "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)" in comments
-    assert "std_mm" not in export(variable, "field-csv", options=Options(grid="q1=3")).text
+    assert "std_mm" not in export(variable, "field-csv", options=ExportOptions(grid="q1=3")).text
 
 
 @pytest.mark.parametrize("text", ["a--b", "a---b", "----", "the end-", "well-formed"])
@@ -418,17 +420,17 @@ def test_samples_say_at_which_features(tmp_path):
     arm = VirtualArm(robot, seed=3)
     table = arm.measure_table(arm.poses(60)).assign(warmth=np.linspace(20.0, 30.0, 60))
     calibration = ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=("warmth",))
-    made = export(calibration, "field-csv", options=Options(grid="q1=3", features={"warmth": 21.5}))
+    made = export(calibration, "field-csv", options=ExportOptions(grid="q1=3", features={"warmth": 21.5}))
     assert "# Features: warmth 21.5." in made.text
     number: Any = np.float32(21.5)
-    again = export(calibration, "field-csv", options=Options(grid="q1=3", features={"warmth": number}))
+    again = export(calibration, "field-csv", options=ExportOptions(grid="q1=3", features={"warmth": number}))
     assert again.text == made.text
 
 
 def test_samples_are_of_one_number_of_each_feature():
     several: Any = {"warmth": [20.0, 21.0, 22.0]}
     with pytest.raises(UsageError, match='the feature "warmth" is .*It must be a number'):
-        Options(features=several)
+        ExportOptions(features=several)
 
 
 def test_without_a_grid_samples_cover_the_measured_readings(variable):
@@ -439,11 +441,11 @@ def test_without_a_grid_samples_cover_the_measured_readings(variable):
 @pytest.mark.parametrize(
     ("to", "options", "error", "message"),
     [
-        ("udf", Options(), UsageError, 'there is no format "udf". Known are "urdf"'),
-        ("dh-csv", Options(urdf="x.urdf"), UsageError, "--urdf is given with --to dh-csv"),
-        ("urdf", Options(grid="q1=3"), UsageError, "It belongs to --to field-csv"),
-        ("field-csv", Options(), WorkError, "this calibration has no field"),
-        ("urdf", Options(urdf="missing.urdf"), InputError, "there is no such file"),
+        ("udf", ExportOptions(), UsageError, 'there is no format "udf". Known are "urdf"'),
+        ("dh-csv", ExportOptions(urdf="x.urdf"), UsageError, "--urdf is given with --to dh-csv"),
+        ("urdf", ExportOptions(grid="q1=3"), UsageError, "It belongs to --to field-csv"),
+        ("field-csv", ExportOptions(), WorkError, "this calibration has no field"),
+        ("urdf", ExportOptions(urdf="missing.urdf"), InputError, "there is no such file"),
     ],
 )
 def test_what_cannot_be_exported_is_refused(ur10, to, options, error, message):
@@ -470,7 +472,7 @@ def test_what_cannot_be_exported_is_refused(ur10, to, options, error, message):
 )
 def test_bad_grids_are_refused(variable, grid):
     with pytest.raises(UsageError, match="--grid"):
-        export(variable, "field-csv", options=Options(grid=grid))
+        export(variable, "field-csv", options=ExportOptions(grid=grid))
 
 
 def test_nothing_is_written_where_the_place_is_none(ur10, tmp_path):

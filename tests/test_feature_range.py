@@ -12,7 +12,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli import main
-from truearm.exporting import Options, export
+from truearm.exporting import ExportOptions, export
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 from truearm.solving import beyond_learnt
@@ -128,7 +128,7 @@ def test_serving_tells_it_before_it_begins(known, tmp_path, payload_kg, words):
 
 @pytest.mark.parametrize(("payload_kg", "beyond"), [(500.0, [FAR]), (6.0, [])])
 def test_samples_beyond_are_told_with_them_and_in_their_file(known, payload_kg, beyond):
-    made = export(known, "field-csv", options=Options(grid="q1=3", features={"payload_kg": payload_kg}))
+    made = export(known, "field-csv", options=ExportOptions(grid="q1=3", features={"payload_kg": payload_kg}))
     assert [note for note in made.notes if "learnt" in note] == beyond
     comments = " ".join(line[2:] for line in made.text.splitlines() if line.startswith("#"))
     assert (FAR in comments) == bool(beyond)

@@ -115,7 +115,7 @@ def test_nests_in_rows_of_their_own_are_one_pose_of_the_drift(scara):
     task = ArmTask(
         robot=previous.robot.to_dict(),
         data=a_target_a_row(wide),
-        options=ta.Options(model="constant"),
+        options=ta.CalibrationOptions(model="constant"),
         previous=previous.to_bytes(),
         previous_name="previous.calib",
         strip=True,

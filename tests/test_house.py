@@ -94,6 +94,29 @@ def test_type_checkers_find_the_types_of_the_package():
     assert package.joinpath("_core.pyi").is_file()
 
 
+def test_units_are_defined_in_one_module():
+    units = ROOT / "python/truearm/units.py"
+    known = set(_assigned(units))
+    assert "MM_PER_METRE" in known
+    again = {
+        str(path.relative_to(ROOT)): found
+        for path in sorted((ROOT / "python").rglob("*.py"))
+        if path != units and (found := sorted(known.intersection(_assigned(path))))
+    }
+    assert again == {}
+
+
+def _assigned(path: Path) -> list[str]:
+    """Constants that a module assigns."""
+    lines = [
+        node for node in ast.parse(path.read_text()).body if isinstance(node, ast.Assign | ast.AnnAssign)
+    ]
+    targets = [
+        ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target) for node in lines
+    ]
+    return [name for name in targets if name.isupper()]
+
+
 def test_nothing_asks_for_one_processor():
     settings = [*ROOT.glob(".cargo/*"), *ROOT.rglob("Cargo.toml"), ROOT / "pyproject.toml", ROOT / "Makefile"]
     asking = [

@@ -30,24 +30,39 @@ def data(arm):
 
 
 WRONG = {
-    "a prior in words": (lambda: api.Options(prior_mm="2"), "prior_mm is '2'. It must be a number"),
+    "a prior in words": (
+        lambda: api.CalibrationOptions(prior_mm="2"),
+        "prior_mm is '2'. It must be a number",
+    ),
     "an infinite prior": (
-        lambda: api.Options(prior_mm=np.inf),
+        lambda: api.CalibrationOptions(prior_mm=np.inf),
         "prior_mm: inf. It must be positive and finite",
     ),
-    "a prior that is none": (lambda: api.Options(prior_mrad=np.nan), "positive and finite"),
+    "a prior that is none": (lambda: api.CalibrationOptions(prior_mrad=np.nan), "positive and finite"),
     "a share in words": (lambda: api.SplitRule(holdout="0.3"), "holdout is '0.3'. It must be a number"),
     "half a row": (lambda: api.SplitRule(train_size=20.5), "train_size is 20.5. It must be a whole number"),
-    "no seed": (lambda: api.Options.of(seed=None), "seed is None. It must be a whole number"),
-    "no features": (lambda: api.Options.of(features=None), "features is None. It must be a list of names"),
-    "features that are numbers": (lambda: api.Options(features=[1]), "a name of features is 1"),
+    "no seed": (lambda: api.CalibrationOptions.of(seed=None), "seed is None. It must be a whole number"),
+    "no features": (
+        lambda: api.CalibrationOptions.of(features=None),
+        "features is None. It must be a list of names",
+    ),
+    "features that are numbers": (lambda: api.CalibrationOptions(features=[1]), "a name of features is 1"),
     "a column that is none": (lambda: api.SplitRule(split_by=3), "split_by is 3. It must be a list of names"),
-    "a repeatability in words": (lambda: api.Options.of(repeatability_mm="0.1"), "must be a number"),
-    "a degree in words": (lambda: api.Options.of(degree="2"), "degree is '2'. It must be a whole number"),
-    "no fit in words": (lambda: api.Options(refit="no"), "refit is 'no'. It must be True or False"),
+    "a repeatability in words": (
+        lambda: api.CalibrationOptions.of(repeatability_mm="0.1"),
+        "must be a number",
+    ),
+    "a degree in words": (
+        lambda: api.CalibrationOptions.of(degree="2"),
+        "degree is '2'. It must be a whole number",
+    ),
+    "no fit in words": (
+        lambda: api.CalibrationOptions(refit="no"),
+        "refit is 'no'. It must be True or False",
+    ),
     "a range in words": (lambda: api.SplitRule(holdout_range="q2"), '"q2" is no range to hold out'),
     "a range of another kind": (lambda: api.SplitRule(holdout_range=2), "is of type int. A .*HoldoutRange"),
-    "a split of another kind": (lambda: api.Options(split=0.3), "the split is of type float"),
+    "a split of another kind": (lambda: api.CalibrationOptions(split=0.3), "the split is of type float"),
     "half a frame row": (lambda: api.EvaluationOptions(frame_rows=10.5), "frame_rows is 10.5"),
     "half a seed": (lambda: api.EvaluationOptions(seed=1.5), "seed is 1.5. It must be a whole number"),
     "a kept tool in words": (lambda: api.UpdateOptions(keep_tool="no"), "keep_tool is 'no'"),
@@ -65,7 +80,10 @@ WRONG = {
     ),
     "a seed below zero": (lambda: api.SplitRule(seed=-1), "seed: -1. Zero or more"),
     "no rows that train": (lambda: api.SplitRule(train_size=0), "train_size: 0. It must be positive"),
-    "a word with a slip": (lambda: api.Options(robust="hubre"), 'robust: "hubre" .* Did you mean "huber"'),
+    "a word with a slip": (
+        lambda: api.CalibrationOptions(robust="hubre"),
+        'robust: "hubre" .* Did you mean "huber"',
+    ),
     "half a region": (lambda: RULES["scheme"](most_regions=1.5), "most_regions is 1.5"),
     "joints in words": (lambda: RULES["scheme"](scheme_joints="12"), "scheme_joints is '12'"),
     "half a joint": (lambda: RULES["scheme"](scheme_joints=(1.5,)), "a number of scheme_joints is 1.5"),
@@ -73,11 +91,11 @@ WRONG = {
     "a criterion": (lambda: RULES["plan"](criterion="e"), '"e" is not known. Either kappa or d'),
     "no poses": (lambda: RULES["plan"](count=0), "0 poses. At least one is planned"),
     "a split in two ways": (
-        lambda: api.Options.of(split=ta.SplitRule(holdout=0.2), seed=3),
+        lambda: api.CalibrationOptions.of(split=ta.SplitRule(holdout=0.2), seed=3),
         'split is given as an object, and "seed" by keyword',
     ),
     "a scheme in two ways": (
-        lambda: api.Options.of(scheme=SchemeOptions(), rate=0.2, epochs=3),
+        lambda: api.CalibrationOptions.of(scheme=SchemeOptions(), rate=0.2, epochs=3),
         'scheme is given as an object, and "rate" and "epochs" by keyword',
     ),
 }
@@ -97,7 +115,7 @@ def test_threads_that_cannot_be_are_refused(threads, arm, data):
 
 
 def test_numbers_of_numpy_become_those_of_python():
-    options = ta.Options.of(
+    options = ta.CalibrationOptions.of(
         train_size=np.int64(30),
         seed=np.int32(2),
         holdout=np.float32(0.25),
@@ -112,7 +130,7 @@ def test_numbers_of_numpy_become_those_of_python():
     )
     told = options.to_dict()
     assert json.loads(json.dumps(told, allow_nan=False)) == told
-    assert ta.Options.of(**told) == options
+    assert ta.CalibrationOptions.of(**told) == options
     assert (told["train_size"], told["holdout"], told["scheme_joints"]) == (30, 0.25, [1, 2])
     assert type(options.split.seed) is int
     assert type(ta.EvaluationOptions(seed=np.int64(1)).seed) is int  # type: ignore[arg-type]
@@ -132,7 +150,8 @@ def test_a_calibration_with_numbers_of_numpy_is_saved(arm, data, tmp_path):
 
 
 def test_names_are_one_text_or_several():
-    assert ta.Options(features="load, warmth") == ta.Options(features=("load", "warmth"))  # type: ignore[arg-type]
+    options = ta.CalibrationOptions(features="load, warmth")  # type: ignore[arg-type]
+    assert options == ta.CalibrationOptions(features=("load", "warmth"))
     assert ta.SplitRule(split_by=["a", "b"]) == ta.SplitRule(split_by="a,b")  # type: ignore[arg-type]
 
 

@@ -165,7 +165,7 @@ def test_no_name_is_offered_where_there_is_none():
 @pytest.fixture(scope="module")
 def positions_alone():
     arm = VirtualArm(ABB, seed=3)
-    return ta.calibrate(ABB, arm.measure(arm.poses(60, seed=1)), ta.Options.of(model="constant"))
+    return ta.calibrate(ABB, arm.measure(arm.poses(60, seed=1)), ta.CalibrationOptions.of(model="constant"))
 
 
 def notices_of(path, calibration, frames="", kinds=("frames", "tool")):
@@ -194,7 +194,7 @@ def test_tools_that_no_measurement_of_a_target_places_are_told(tmp_path, positio
     assert "Teach each again" in found.message
     arm = VirtualArm(ABB, seed=3)
     poses = arm.measure(arm.poses(60, seed=1), orientation=True)
-    (found,) = notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant")))
+    (found,) = notices_of(path, ta.calibrate(ABB, poses, ta.CalibrationOptions.of(model="constant")))
     assert "positions and orientations of its target alone" in found.message
 
 

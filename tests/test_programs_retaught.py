@@ -35,7 +35,7 @@ def compensating(robot, seed=3, poses=60, **options):
     """Programming, controller and calibrated model of a virtual arm, positions and orientations measured."""
     arm = VirtualArm(robot, seed=seed)
     measured = arm.measure(arm.poses(poses, seed=1), orientation=True)
-    calibration = ta.calibrate(robot, measured, ta.Options.of(model="constant"))
+    calibration = ta.calibrate(robot, measured, ta.CalibrationOptions.of(model="constant"))
     compensator = ta.Compensator(calibration, **options)
     given = Models(robot, Inverse(robot), Controller.nominal(robot), compensator, compensator.task)
     return calibration, given

@@ -16,7 +16,7 @@ from truearm.cli import calibrate, main, session_export
 from truearm.cli.again import calibrate_again, calibrate_anew, plan_anew
 from truearm.cli.command_words import option_words
 from truearm.errors import typed
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.simulation import VirtualArm
 
 
@@ -280,7 +280,7 @@ def test_options_that_the_command_lacks_are_named(measured):
     ],
 )
 def test_options_that_are_named_again_calibrate_alike(given, monkeypatch):
-    options, made = Options.of(**given), []
+    options, made = CalibrationOptions.of(**given), []
 
     def calibrated(_arm, _data, chosen, _threads):
         made.append(chosen)

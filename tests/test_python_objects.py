@@ -218,7 +218,7 @@ WRONG = {
         'no option "frame_row".*"frame_rows"',
     ),
     "other options": (
-        lambda r, d, c: api.evaluate(c, d, ta.Options()),
+        lambda r, d, c: api.evaluate(c, d, ta.CalibrationOptions()),
         "truearm.EvaluationOptions is needed",
     ),
     "options in two ways": (
@@ -228,7 +228,7 @@ WRONG = {
     "no such option of update": (lambda r, d, c: api.update(c, d, keep_tol=True), 'you mean "keep_tool"'),
     "calibrating with a dict": (
         lambda r, d, c: api.calibrate(r, d, {"seed": 1}),
-        "truearm.Options is needed",
+        "truearm.CalibrationOptions is needed",
     ),
     "a compensator of a file": (lambda r, d, c: api.Compensator("arm.calib"), "Calibration.load"),
     "a programming model by name": (lambda r, d, c: api.Compensator(c, programming="ur10"), "Robot.load"),
@@ -256,7 +256,10 @@ WRONG = {
     "no path": (lambda r, d, c: api.Calibration.load(None), "the file is of type NoneType. A path is needed"),
     "a list for a path": (lambda r, d, c: api.Measurements.read_csv(["m.csv"]), "the file is of type list"),
     "a bound in words": (lambda r, d, c: api.Limits(largest_mm="5"), "largest_mm is '5'. It must be"),
-    "a rate in words": (lambda r, d, c: api.Options.of(rate="1"), "rate is '1'. It must be a number"),
+    "a rate in words": (
+        lambda r, d, c: api.CalibrationOptions.of(rate="1"),
+        "rate is '1'. It must be a number",
+    ),
     "a level in words": (lambda r, d, c: api.UpdateOptions(level="1"), "level is '1'. It must be a number"),
     "a ramp in words": (
         lambda r, d, c: streams.StreamOptions(ramp_s="1"),
@@ -377,7 +380,7 @@ WRONG = {
     ),
     "no robot file": (lambda r, d, c: api.Robot.from_toml(None), "robot: the text is of type NoneType"),
     "names in a set": (
-        lambda r, d, c: api.Options(features={"b"}),
+        lambda r, d, c: api.CalibrationOptions(features={"b"}),
         "features is {'b'}. It must be a list of names, as a set has no order",
     ),
     "columns in a set": (

@@ -21,7 +21,7 @@ from tests.report_support import (
 from truearm.certainty.standard_errors import of_covariance
 from truearm.doubts.of_results import CONSTANT_BETTER
 from truearm.errors import Notice
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
 from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
@@ -424,7 +424,7 @@ def test_where_no_pose_was_planned_to_validate_the_options_do_not_say_that_some_
 
 
 def test_every_option_has_words():
-    assert set(Options().to_dict()) == {*GENERAL, *VARIABLE, *SCHEMES}
+    assert set(CalibrationOptions().to_dict()) == {*GENERAL, *VARIABLE, *SCHEMES}
     for model in MODELS:
         assert not [words for words in shown_options(model).values() if "_" in words]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.report_support import words_of
-from truearm import Calibration, Options, Robot, UsageError, WorkError, calibrate, evaluate
+from truearm import Calibration, CalibrationOptions, Robot, UsageError, WorkError, calibrate, evaluate
 from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
@@ -153,7 +153,7 @@ def test_a_scheme_of_an_arm_without_determined_parameters_is_refused():
 )
 def test_options_that_make_no_sense_are_refused(given, message):
     with pytest.raises(UsageError, match=message):
-        Options.of(**given)
+        CalibrationOptions.of(**given)
 
 
 def test_numbers_that_a_model_does_not_use_may_be_any():
@@ -162,7 +162,7 @@ def test_numbers_that_a_model_does_not_use_may_be_any():
         {"model": "fcmac", "sigma_cells": 0.01, "membership": "bspline"},
         {"model": "regions", "rate": 3.0, "cells": [1, 1, 1], "train_on": "measurements"},
     ):
-        assert Options.of(**given).to_dict().items() >= given.items()
+        assert CalibrationOptions.of(**given).to_dict().items() >= given.items()
 
 
 def test_the_core_knows_the_rules_of_networks():
@@ -175,7 +175,7 @@ def test_the_core_knows_the_rules_of_networks():
     ):
         given: Any = {"model": "fcmac", "scheme_joints": (1,), "cells": (sensor[2],), "active": sensor[3]}
         with nullcontext() if fits else pytest.raises(UsageError):
-            Options.of(**given, sigma_cells=sigma)
+            CalibrationOptions.of(**given, sigma_cells=sigma)
         with nullcontext() if fits else pytest.raises(CoreError):
             Network([sensor], 1, SchemeOptions(sigma_cells=sigma).network(fuzzy=True))
 

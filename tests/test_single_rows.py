@@ -113,7 +113,7 @@ def test_a_set_up_that_moved_is_told_with_the_arm_that_changed_as_well(spoilt):
 def test_an_arm_of_a_fleet_is_compared_without_outliers(spoilt):
     arm, calibration = spoilt
     data = ta.Measurements.from_dataframe(off(arm.measure_table(arm.poses(POSES)), HELD[:1], 0.03))
-    previous, options = calibration.to_bytes(), ta.Options.of(**HUBER)
+    previous, options = calibration.to_bytes(), ta.CalibrationOptions.of(**HUBER)
     made = calibrate_arm(ArmTask(arm.robot.to_dict(), data, options, previous, "last.calib", False, False))
     row = row_of_made("R1", made)
     assert row["mean_mm"] > 1.0

@@ -7,10 +7,10 @@ import pytest
 
 import truearm as ta
 from truearm.doubts.at_once import (
-    AT_ONCE,
     JOINT,
     JOINT_MOVED,
     SETUP_TURNED,
+    STEP_KINDS,
     TARGET_SLIPPED,
     Left,
     Shape,
@@ -56,7 +56,7 @@ def calibrated(arm, data):
 
 
 def told(notices):
-    return {notice.kind: str(notice) for notice in notices if notice.kind in AT_ONCE}
+    return {notice.kind: str(notice) for notice in notices if notice.kind in STEP_KINDS}
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def slipped(arm, steady):
 
 
 def test_an_arm_that_stays_as_it_is_is_not_doubted(known):
-    assert not set(AT_ONCE) & set(known[1])
+    assert not set(STEP_KINDS) & set(known[1])
 
 
 def test_a_target_that_slips_is_told_with_row_and_size(slipped):
@@ -89,7 +89,7 @@ def test_the_report_puts_it_first_and_advises_no_more_poses(slipped):
 
 def test_rows_behind_in_a_group_of_their_own_are_right(arm, steady, slipped):
     found, notices = calibrated(arm, with_groups(with_slip(arm, steady)))
-    assert not set(AT_ONCE) & set(notices)
+    assert not set(STEP_KINDS) & set(notices)
     means = [each.validation.holdout["variable"].position.mean for each in (found, slipped[0])]
     assert means[0] < 0.4 * means[1]
 

@@ -6,7 +6,7 @@ import pytest
 
 from truearm.errors import InputError, UsageError
 from truearm.fits.core_set import distance_count
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.measurements import Measurements
 from truearm.rows.splitting import HoldoutRange, SplitRule, split_rows
 
@@ -219,13 +219,13 @@ def test_a_stated_rule_comes_before_what_was_planned():
         SplitRule(holdout=0.4),
         SplitRule(split_by=("layer",)),
         SplitRule(holdout_range=tail),
-        Options.of(holdout=0.3).split,
+        CalibrationOptions.of(holdout=0.3).split,
     ):
         split, same = split_rows(data, rule), split_rows(plain, rule)
         np.testing.assert_array_equal(split.train, same.train)
         np.testing.assert_array_equal(split.holdout, same.holdout)
         assert split.planned == 0
-    assert Options.of(seed=3).split.by_purpose
+    assert CalibrationOptions.of(seed=3).split.by_purpose
 
 
 def test_files_without_poses_to_validate_keep_the_plain_split():
@@ -304,6 +304,6 @@ def test_ranges_that_cannot_be_made(wrong, words):
 def test_every_digit_of_a_range_is_kept():
     tail = HoldoutRange(2, True, 1 / 3)
     assert HoldoutRange.parse(str(tail)) == tail
-    options = Options.of(holdout_range=tail)
-    assert Options.of(**options.to_dict()) == options
+    options = CalibrationOptions.of(holdout_range=tail)
+    assert CalibrationOptions.of(**options.to_dict()) == options
     assert SplitRule(holdout_range=str(tail)).holdout_range == tail  # type: ignore[arg-type]

@@ -1,5 +1,7 @@
 """Streams of set-points from Python."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,10 +15,11 @@ OPEN = ta.Limits(largest_std_mm=50.0)
 
 
 def test_what_is_not_stated_is_the_core_s_in_streams_and_bounds():
-    stated, usual = StreamOptions().core(), Stream.usual()
+    stated: Any = StreamOptions().core()
+    usual = Stream.usual()
     assert stated.keys() == usual.keys()
     assert all(stated[name] == pytest.approx(value, rel=1e-15) for name, value in usual.items())
-    bounds = ta.Limits().core(ta.Robot.load("ur5e"))
+    bounds: Any = ta.Limits().core(ta.Robot.load("ur5e"))
     assert bounds.keys() == {"joints"} | Corrector.usual().keys()
     assert {name: bounds[name] for name in Corrector.usual()} == pytest.approx(Corrector.usual(), rel=1e-15)
 

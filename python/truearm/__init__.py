@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from truearm.controller import Controller
     from truearm.errors import InputError, Notice, TruearmError, UsageError, WorkError
     from truearm.evaluation import Evaluation, EvaluationOptions, evaluate
-    from truearm.fits.options import Options
+    from truearm.fits.options import CalibrationOptions
     from truearm.limits import Limits
     from truearm.measurements import Measurements
     from truearm.programs.compensating import compensate_program
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Calibration",
+    "CalibrationOptions",
     "Choices",
     "Compensated",
     "Compensator",
@@ -44,7 +45,6 @@ __all__ = [
     "Limits",
     "Measurements",
     "Notice",
-    "Options",
     "Refusal",
     "Rewritten",
     "Robot",
@@ -79,7 +79,7 @@ _HOME: Final = {
     "evaluate": "evaluation",
     "Limits": "limits",
     "Measurements": "measurements",
-    "Options": "fits.options",
+    "CalibrationOptions": "fits.options",
     "compensate_program": "programs.compensating",
     "Frames": "programs.frames",
     "Choices": "programs.rewriting",

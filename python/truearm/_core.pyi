@@ -1,7 +1,7 @@
 """The compiled core. Private: the package's modules wrap it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, final
+from typing import Any, Protocol, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,6 +194,28 @@ class Clearance:
         Ways are straight between stops (s, J) and (p, 3); each comes with the step at which it is looked at.
         """
 
+@type_check_only
+class MeasuredArrays(TypedDict):
+    """Measurements of n poses.
+
+    Attributes:
+        joints: Denavit-Hartenberg joint values (n, J).
+        group: Number of each pose's set-up (n,), from 0.
+        targets: In world (n, T, 3).
+        rotations: world_from_target (n, 3, 3), or None.
+        sigma: Of a position's components (n,).
+        weight: Of each pose (n,).
+        distances: In place of targets: pose, whether to an anchor, number of the anchor or other pose, m.
+    """
+
+    joints: NDArray[np.float64]
+    group: NDArray[np.int64]
+    targets: NDArray[np.float64]
+    rotations: NDArray[np.float64] | None
+    sigma: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    distances: Sequence[tuple[int, bool, int, float]]
+
 @final
 class MeasurementSet:
     """Measurements of n poses, as the estimators read them. SI units; NaN where nothing was measured.
@@ -202,16 +224,7 @@ class MeasurementSet:
         CoreError: Lengths do not fit, a joint value or a sigma is not finite, an index is out of range.
     """
 
-    def __init__(self, arrays: Mapping[str, Any]) -> None:
-        """Make a set.
-
-        Args:
-            arrays: joints (n, J) Denavit-Hartenberg joint values; group (n,) int64 from 0; targets
-                (n, T, 3) in world; rotations (n, 3, 3) world_from_target, or None; sigma (n,) of a position's
-                components; weight (n,); distances: (pose, whether to an anchor, anchor or other pose, m),
-                in place of targets.
-        """
-
+    def __init__(self, arrays: MeasuredArrays) -> None: ...
     @property
     def rows_per_pose(self) -> int:
         """m: three rows of residuals a target, then three of the orientation if it was measured."""
@@ -339,7 +352,7 @@ class FieldFit:
 
     @property
     def scores(self) -> NDArray[np.float64]:
-        """Squared standardised leave-one-out residuals over the limit, (n,); above one is an outlier."""
+        """Squared standardised leave-one-out residuals over the squared limit, (n,); outliers exceed one."""
 
     @property
     def distances(self) -> NDArray[np.float64]:
@@ -399,6 +412,42 @@ class Field:
     def parameters(self, inputs: NDArray[np.float64], constants: NDArray[np.float64]) -> NDArray[np.float64]:
         """Absolute parameters (n, L, 5) at inputs (n, I): constants (L, 5) and what is added to them."""
 
+@type_check_only
+class BoundsPlan(TypedDict):
+    """What the tables of bounds are over.
+
+    Attributes:
+        angles: Whether each of I inputs is one.
+        ranges: Lowest and highest value of each.
+        together: Inputs that are tabulated together as well.
+        largest: Bounds that are never exceeded, (2,).
+        centre: The point (3,) whose position is meant, in the flange's frame, m.
+    """
+
+    angles: Sequence[bool]
+    ranges: Sequence[tuple[float, float]]
+    together: Sequence[int]
+    largest: Sequence[float]
+    centre: Sequence[float]
+
+@type_check_only
+class BoundsContent(TypedDict):
+    """All of bounds but tables and factor.
+
+    Attributes:
+        level: (2,).
+        largest: Bounds that are never exceeded, (2,).
+        ranges: Lowest and highest value of each input; None for any.
+        looseness: Median ratio to exact values, (2,).
+        centre: As in BoundsPlan.
+    """
+
+    level: list[float]
+    largest: list[float]
+    ranges: list[list[float] | None]
+    looseness: list[float]
+    centre: list[float]
+
 @final
 class Conservative:
     """Bounds of the standard deviation of the flange: roots of the sums of variances.
@@ -413,11 +462,14 @@ class Conservative:
         blocks: Sequence[dict[str, Any]],
         leverage: tuple[Chain, NDArray[np.float64]] | None = None,
     ) -> None:
-        """Bounds from what `content`, `blocks` and, with the chain to the flange, `factor` gave."""
+        """Bounds from what `content`, `blocks` and, with the chain to the flange, `factor` gave.
+
+        The content has the keys of BoundsContent, and may have others.
+        """
 
     @staticmethod
     def fit(
-        plan: Mapping[str, Any],
+        plan: BoundsPlan,
         fitted: tuple[NDArray[np.float64], NDArray[np.float64]],
         fresh: tuple[NDArray[np.float64], NDArray[np.float64]],
         chain: Chain | None = None,
@@ -425,8 +477,7 @@ class Conservative:
         """Fit to exact values, and raise the fit by what fresh ones show.
 
         Args:
-            plan: angles: whether each input is one; ranges: lowest and highest value of each; together:
-                inputs that are tabulated together as well; largest: bounds that are never exceeded.
+            plan: What the tables are over.
             fitted: Inputs (n, I) and exact values (n, 2).
             fresh: The same at other configurations.
             chain: To the flange, of the joint values that are the first inputs; the bound of the position is
@@ -442,10 +493,8 @@ class Conservative:
         The first bound is a multiple of the norm of the centre's motion by them times this.
         """
 
-    def content(self) -> dict[str, Any]:
-        """All but tables and factor: level, largest, ranges (None for any), looseness (median ratio to
-        exact), and centre, the point whose position is meant, in the flange's frame, m.
-        """
+    def content(self) -> BoundsContent:
+        """All but tables and factor."""
 
     def blocks(self) -> list[dict[str, Any]]:
         """The tables, as Field.blocks."""
@@ -462,7 +511,7 @@ class Posterior:
         problem: Problem,
         parameters: NDArray[np.float64],
         setup: Setup,
-        options: Mapping[str, Any],
+        options: FieldOptions,
     ) -> None:
         """The posterior, linearised at parameters (L, 5) and set-up; options as for fit_field."""
 
@@ -547,6 +596,46 @@ class ArmModel:
             bounds: Bounds of the standard deviation, in place of a covariance.
         """
 
+@type_check_only
+class CorrectorBounds(TypedDict):
+    """How far a correction may go; SI, infinite for no bound.
+
+    Attributes:
+        joints: Lowest and highest readings, (N, 2), or (0, 2) for none.
+        largest_angle: Largest change of a revolute joint's reading.
+        largest_slide: Largest change of a prismatic joint's reading.
+        largest_shift: Largest shift of the tool.
+        largest_turn: Largest turn of the tool.
+        largest_std: Largest standard deviation of the tool's position.
+        shift_change: Largest change of the shift along a path, m per m.
+        turn_change: Largest change of the turn along a path, rad per rad.
+        residual: How far from its target the tool may stay.
+        residual_turn: How far it may stay turned from it.
+    """
+
+    joints: NDArray[np.float64]
+    largest_angle: float
+    largest_slide: float
+    largest_shift: float
+    largest_turn: float
+    largest_std: float
+    shift_change: float
+    turn_change: float
+    residual: float
+    residual_turn: float
+
+@type_check_only
+class CorrectorOptions(CorrectorBounds):
+    """What a correction is to meet, and its bounds.
+
+    Attributes:
+        task: "pose", "axis" or "position".
+        moving: Ascending joints from 0 that may change, or None for all.
+    """
+
+    task: str
+    moving: Sequence[int] | None
+
 @final
 class Corrector:
     """Finds readings for which the calibrated model puts the tool where the programming model puts it."""
@@ -556,7 +645,7 @@ class Corrector:
         calibrated: ArmModel,
         programming: ArmModel,
         tool: NDArray[np.float64],
-        options: Mapping[str, Any],
+        options: CorrectorOptions,
     ) -> None:
         """Make a corrector.
 
@@ -564,10 +653,7 @@ class Corrector:
             calibrated: What the arm is.
             programming: What the program was written for.
             tool: flange_from_tool (4, 4).
-            options: task "pose", "axis" or "position"; moving, ascending joints from 0, or None for all;
-                joints, lowest and highest readings (N, 2) or (0, 2); and in SI, infinite for no bound:
-                largest_angle, largest_slide, largest_shift, largest_turn, largest_std, shift_change,
-                turn_change, residual, residual_turn.
+            options: Task and bounds.
 
         Raises:
             CoreError: If the models have different joints or an option breaks a rule.
@@ -595,6 +681,24 @@ class Corrector:
     ) -> tuple[NDArray[np.float64], tuple[int, str] | None]:
         """Correct readings (N,): corrected ones, NaN if refused; then number and words for why."""
 
+@type_check_only
+class StreamOptions(TypedDict):
+    """How a stream's correction changes.
+
+    Attributes:
+        rate: Largest, of revolute and of prismatic joints, rad/s and m/s.
+        acceleration: The same, rad/s^2 and m/s^2.
+        ramp: How long the ramp takes, s.
+        hold: How long the last correction is held, s.
+        deadline: Longest time between two set-points, s.
+    """
+
+    rate: Sequence[float]
+    acceleration: Sequence[float]
+    ramp: float
+    hold: float
+    deadline: float
+
 @final
 class Stream:
     """Corrects set-points one after the other; the correction changes with bounded rate and acceleration.
@@ -602,20 +706,19 @@ class Stream:
     Where a set-point is missing, not finite, late or refused, the last correction is held, then ramped down.
     """
 
-    def __init__(self, corrector: Corrector, options: Mapping[str, Any]) -> None:
+    def __init__(self, corrector: Corrector, options: StreamOptions) -> None:
         """Make a stream that is switched on.
 
         Args:
             corrector: Corrects single set-points.
-            options: rate and acceleration, each of revolute and prismatic joints (rad and m, s); ramp, hold
-                and deadline, s.
+            options: Bounds and times.
 
         Raises:
             CoreError: An option is not positive.
         """
 
     @staticmethod
-    def usual() -> dict[str, Any]:
+    def usual() -> StreamOptions:
         """The options where nothing is stated."""
 
     def switch(self, on: bool) -> None:
@@ -636,7 +739,7 @@ class Stream:
 class Solver:
     """Finds readings for poses, near a seed."""
 
-    def __init__(self, model: ArmModel, tool: NDArray[np.float64], options: Mapping[str, Any]) -> None:
+    def __init__(self, model: ArmModel, tool: NDArray[np.float64], options: CorrectorOptions) -> None:
         """Make a solver for flange_from_tool (4, 4); options as for Corrector."""
 
     def solve(
@@ -659,29 +762,78 @@ class Solver:
             for Corrector.path.
         """
 
-def fit_constant(problem: Problem, options: Mapping[str, Any]) -> ConstantFit:
+@type_check_only
+class ConstantOptions(TypedDict):
+    """How constants are fitted.
+
+    Attributes:
+        prior: Standard deviation of lengths (m), of angles (rad), whether the evidence scales them; or None.
+        noise: Of positions and orientations (m, rad), or None to estimate it.
+        robust: "huber", "cauchy", "none" or None.
+        start: A set-up to begin at, or None.
+        parameters: Of a fixed arm (L, 5) or (n, L, 5), where the search begins with columns (L, 5), or None.
+        threads: At the most, or None for all.
+    """
+
+    prior: tuple[float, float, bool] | None
+    noise: tuple[float, float] | None
+    robust: str | None
+    start: Setup | None
+    parameters: NDArray[np.float64] | None
+    threads: int | None
+
+def fit_constant(problem: Problem, options: ConstantOptions) -> ConstantFit:
     """Fit constants and set-up.
 
     Args:
         problem: With no columns, frames and targets are fitted alone.
-        options: prior (standard deviation of lengths in m, of angles in rad, whether the evidence scales
-            them), or None; noise (m, rad), or None to estimate it; robust "huber", "cauchy" or None; start, a
-            set-up, or None; parameters, a fixed arm (L, 5) or (n, L, 5), or None; threads, or None for all.
+        options: How to fit.
 
     Raises:
         CoreError: Measurements are too few or too alike.
     """
 
-def fit_field(problem: Problem, constant: ConstantFit, options: Mapping[str, Any]) -> FieldFit:
+@type_check_only
+class FieldOptions(TypedDict):
+    """How a field is fitted.
+
+    Attributes:
+        determined: Indices into the problem's columns of the constants that the poses determine.
+        driven: Indices into the problem's columns of what the field varies.
+        features: Values of the F features (n, F).
+        feature_ranges: How far each reaches.
+        payloads: Features, from 0, that are loads on the flange.
+        coupling: Joint values from readings (J, J).
+        degree: Of the splines, 2 or 3.
+        prior: As for fit_constant.
+        hyper: Hyper-parameters to keep, or None to find them.
+        near: A fit to nearly the same rows, at whose hyper-parameters the search begins, or None.
+        contested: Whether a search from nothing stands against that one.
+        rough: Whether those of a search on a part of the rows are enough.
+        threads: At the most, or None for all.
+    """
+
+    determined: Sequence[int]
+    driven: Sequence[int]
+    features: NDArray[np.float64]
+    feature_ranges: Sequence[float]
+    payloads: Sequence[int]
+    coupling: NDArray[np.float64]
+    degree: int
+    prior: tuple[float, float, bool]
+    hyper: dict[str, list[float]] | None
+    near: FieldFit | None
+    contested: bool
+    rough: bool
+    threads: int | None
+
+def fit_field(problem: Problem, constant: ConstantFit, options: FieldOptions) -> FieldFit:
     """Fit constants, field and set-up together. Honours Ctrl-C.
 
     Args:
         problem: Over all candidates.
         constant: The constants' fit, over those that are determined.
-        options: determined and driven, indices into the problem's columns; features (n, F); feature_ranges;
-            degree 2 or 3; prior as for fit_constant; hyper, or None to find them; near, a fit
-            to nearly the same rows whose hyper-parameters the search begins at, or None; rough, whether those
-            of a search on a part of the rows are enough; threads, or None for all.
+        options: How to fit.
 
     Weights of the measurements between zero and one are where the search begins; after it every row is judged
     by the others. Rows of weight zero take no part.
@@ -811,15 +963,28 @@ def setup_jacobian(problem: Problem, parameters: NDArray[np.float64], setup: Set
 def step_setup(problem: Problem, setup: Setup, step: NDArray[np.float64]) -> Setup:
     """The set-up after a step (G, W) of the unknowns of `setup_jacobian`."""
 
+@type_check_only
+class Candidates(TypedDict):
+    """Poses that could be measured, m entries each.
+
+    Attributes:
+        noise: Covariance of each measurement (c, m, m).
+        points: Where they are (c, 3), m.
+        apart: Distance that they are chosen at from one another, as long as there are such, m.
+    """
+
+    noise: NDArray[np.float64]
+    points: NDArray[np.float64]
+    apart: float
+
 def choose_informative(
-    covariance: NDArray[np.float64], candidates: Mapping[str, Any], count: int
+    covariance: NDArray[np.float64], candidates: Candidates, count: int
 ) -> tuple[list[int], list[float]]:
     """Candidates, one after the other, that leave the targets the least variance. Honours Ctrl-C.
 
     Args:
         covariance: (c m + t, c m + t) of what c candidates would show, m entries each, then of t targets.
-        candidates: noise (c, m, m) of the measurements; points (c, 3); apart, the distance that they are
-            chosen at from one another, as long as there are such.
+        candidates: What can be measured.
         count: How many.
 
     Returns:
@@ -829,7 +994,7 @@ def choose_informative(
 def choose_telling(
     changed: NDArray[np.float64],
     unchanged: NDArray[np.float64],
-    candidates: Mapping[str, Any],
+    candidates: Candidates,
     count: int,
 ) -> tuple[list[int], list[float]]:
     """Candidates, one after the other, that tell most about what may have changed. Honours Ctrl-C.
@@ -843,6 +1008,63 @@ def choose_telling(
     Returns:
         Indices, and the information about the changes, nat, before the first choice and after each.
     """
+
+@type_check_only
+class NetworkOptions(TypedDict):
+    """What a network is.
+
+    Attributes:
+        membership: "gaussian" (A3), "bspline" (degree c - 1, c from 2 to 4) or "quantised" (the CMAC).
+        sigma: Of "gaussian", in cells.
+        composition: "min" or "product".
+        table: Rows of a hash table, or None for a row of weights for each association cell.
+    """
+
+    membership: str
+    sigma: float
+    composition: str
+    table: int | None
+
+@type_check_only
+class TrainingRule(TypedDict):
+    """How a network is trained by rule (A5), whatever its outputs are.
+
+    Attributes:
+        rate: Above 0 and below 2.
+        normalise: "printed" for w += rate mu (CEP - CEP') or "squares" for that times sum(mu) / sum(mu^2).
+        tolerance: Largest difference allowed in m, angles at 0.3 m.
+        epochs: At the most.
+    """
+
+    rate: float
+    normalise: str
+    tolerance: float
+    epochs: int
+
+@type_check_only
+class TrainingOptions(TrainingRule):
+    """The rule, and what the outputs are.
+
+    Attributes:
+        columns: Parameter indices (P,), 5 * link + (theta, d, a, alpha, beta): they tell angles from lengths.
+    """
+
+    columns: Sequence[int]
+
+@type_check_only
+class NetworkFitOptions(TypedDict):
+    """How a network is fitted to measurements.
+
+    Attributes:
+        columns: As in TrainingOptions.
+        scales: Standard deviations in m (angles at 0.3 m) of the noise, of second differences of weights
+            along an input, and of what has none; None to find them by maximum marginal likelihood.
+        threads: At the most, or None for all.
+    """
+
+    columns: Sequence[int]
+    scales: tuple[float, float, float] | None
+    threads: int | None
 
 @final
 class Network:
@@ -859,16 +1081,14 @@ class Network:
     """
 
     def __init__(
-        self, sensors: Sequence[tuple[float, float, int, int]], outputs: int, options: Mapping[str, Any]
+        self, sensors: Sequence[tuple[float, float, int, int]], outputs: int, options: NetworkOptions
     ) -> None:
         """A network whose weights are zero.
 
         Args:
             sensors: For each input its lower and upper end, number of cells, and c, 1 to 8.
             outputs: P.
-            options: membership "gaussian" (A3), "bspline" (degree c - 1, c from 2 to 4) or "quantised" (the
-                CMAC); sigma, in cells, of "gaussian"; composition "min" or "product"; table, the rows of a
-                hash table, or None for a row of weights for each association cell.
+            options: Its cells and their composition.
         """
 
     @property
@@ -910,9 +1130,7 @@ class Network:
     ) -> NDArray[np.float64]:
         """Outputs (n, P) of inputs (n, I); into `out` if it is given. `threads` does not change them."""
 
-    def train(
-        self, s: NDArray[np.float64], ceps: NDArray[np.float64], options: Mapping[str, Any]
-    ) -> Training:
+    def train(self, s: NDArray[np.float64], ceps: NDArray[np.float64], options: TrainingOptions) -> Training:
         """Train by rule (A5) on wanted CEPs (k, P) at inputs (k, I); weights start at the mean CEPs.
 
         Honours Ctrl-C.
@@ -920,10 +1138,7 @@ class Network:
         Args:
             s: Inputs.
             ceps: m and rad.
-            options: columns (P,), parameter indices 5 * link + (theta, d, a, alpha, beta), which tell angles
-                from lengths; rate, above 0 and below 2; normalise "printed" for w += rate mu (CEP - CEP') or
-                "squares" for that times sum(mu) / sum(mu^2); tolerance, the largest difference allowed in m,
-                angles at 0.3 m; epochs at most.
+            options: How to train.
         """
 
     def train_on_measurements(
@@ -931,7 +1146,7 @@ class Network:
         s: NDArray[np.float64],
         jacobian: NDArray[np.float64],
         residual: NDArray[np.float64],
-        options: Mapping[str, Any],
+        options: TrainingOptions,
     ) -> Training:
         """Train by rule (A5) on rows as `linearise` gives them. Honours Ctrl-C.
 
@@ -950,7 +1165,7 @@ class Network:
         s: NDArray[np.float64],
         jacobian: NDArray[np.float64],
         residual: NDArray[np.float64],
-        options: Mapping[str, Any],
+        options: NetworkFitOptions,
     ) -> NetworkFit:
         """Fit the weights to rows as `linearise` gives them, with a roughness penalty. Honours Ctrl-C.
 
@@ -958,9 +1173,7 @@ class Network:
             s: Inputs (n, I).
             jacobian: (n, m, P).
             residual: (n, m); n m is 12000 at most.
-            options: columns as for `train`; scales, standard deviations in m (angles at 0.3 m) of the noise,
-                of second differences of weights along an input, and of what has none, or None to find them by
-                maximum marginal likelihood; threads, or None for all.
+            options: How to fit.
         """
 
 @final
@@ -1015,6 +1228,26 @@ class NetworkFit:
     def residual(self) -> NDArray[np.float64]:
         """What the network leaves of the residuals, (n, m)."""
 
+@type_check_only
+class ChoiceOptions(TypedDict):
+    """How poses are chosen from a pool.
+
+    Attributes:
+        columns: Parameter indices (P,).
+        criterion: "kappa", "d" (determinant) or "o1" to "o5".
+        limit: Of kappa(M), or None.
+        given: Jacobians (k, m, P) of poses that are measured anyway, or None.
+        start: Candidates (count,) to exchange from, or None.
+        passes: Runs through the chosen poses at the most.
+    """
+
+    columns: Sequence[int]
+    criterion: str
+    limit: float | None
+    given: NDArray[np.float64] | None
+    start: NDArray[np.int64] | None
+    passes: int
+
 @final
 class Choice:
     """Chosen poses and what the choice gained. Indices are those of `observability`."""
@@ -1039,15 +1272,13 @@ class Choice:
     def well_conditioned(self) -> bool:
         """Whether kappa is finite and within the limit; else the pool cannot be well conditioned."""
 
-def choose_poses(jacobian: NDArray[np.float64], count: int, options: Mapping[str, Any]) -> Choice:
+def choose_poses(jacobian: NDArray[np.float64], count: int, options: ChoiceOptions) -> Choice:
     """Choose poses from a pool by exchange. Honours Ctrl-C.
 
     Args:
         jacobian: The candidates' (N, m, P), m and rad, m from 3 to 6.
         count: How many to choose.
-        options: columns (P,), parameter indices; criterion "kappa", "d" (determinant) or "o1" to "o5"; limit
-            of kappa(M), or None; given (k, m, P), of poses that are measured anyway, or None; start (count,)
-            int64, candidates to exchange from, or None; passes, runs through the chosen poses at most.
+        options: Criterion, limit, and where to begin.
 
     Raises:
         CoreError: A number is out of its range, a shape does not fit, a value is not finite.
@@ -1166,13 +1397,25 @@ class RegionalFit:
     def prior(self) -> NDArray[np.float64]:
         """Standard deviation in m of a half's CEPs about its whole's, by depth from 1 on."""
 
+@type_check_only
+class RegionalOptions(TypedDict):
+    """How CEPs of regions are estimated.
+
+    Attributes:
+        method: "least_squares", in each region alone, or "shrunk", towards the region it is half of.
+        prior: Standard deviation in m of that step, or None to find it from the measurements.
+    """
+
+    method: str
+    prior: float | None
+
 def regional_ceps(
     regions: Regions,
     problem: Problem,
     parameters: NDArray[np.float64],
     setup: Setup,
     features: NDArray[np.float64],
-    options: Mapping[str, Any],
+    options: RegionalOptions,
 ) -> RegionalFit:
     """Estimate the CEPs of every region, of all sizes, from the measurements in it; the set-up is held.
 
@@ -1182,8 +1425,7 @@ def regional_ceps(
         parameters: Those that CEPs are added to, (L, 5).
         setup: Frames and targets.
         features: Of each measurement, (n, F).
-        options: method "least_squares", in each region alone, or "shrunk", towards the region it is half of;
-            prior, the standard deviation in m of that step, or None to find it from the measurements.
+        options: How to estimate.
     """
 
 def fill_without_data(regions: Regions, ceps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -1232,14 +1474,58 @@ class Workspace(Protocol):
     def measure(self, q: NDArray[np.float64], /) -> MeasurementSet:
         """Measure poses with joint values (k, J), all of one group."""
 
+@type_check_only
+class DivisionOptions(TypedDict):
+    """How a workspace is divided.
+
+    Attributes:
+        low: Lower corner (F,) of the workspace.
+        high: Its upper corner (F,).
+        accuracy: The demanded one in m.
+        regions: Leaves at the most.
+        halving: "longest" side or "best" axis.
+        order: "worst" or "breadth" first.
+        poses: Of a region; where rows are given, the least that it needs.
+        limit: Of kappa(M).
+        seed: Of what is drawn.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    accuracy: float
+    regions: int
+    halving: str
+    order: str
+    poses: int
+    limit: float
+    seed: int
+
+@type_check_only
+class MeasuringOptions(TypedDict):
+    """What is measured in each region.
+
+    Attributes:
+        candidates: Poses to choose from.
+        tests: Poses to judge by.
+        criterion: As for `choose_poses`.
+        passes: As for `choose_poses`.
+        orientation: Whether it is measured.
+    """
+
+    candidates: int
+    tests: int
+    criterion: str
+    passes: int
+    orientation: bool
+
 def divide(
     chain: Chain,
     columns: Sequence[int],
     parameters: NDArray[np.float64],
     setup: Setup,
     workspace: Workspace,
-    options: Mapping[str, Any],
-    measuring: Mapping[str, Any],
+    options: DivisionOptions,
+    measuring: MeasuringOptions,
 ) -> Division:
     """Divide a workspace that is measured on demand, steps 1 to 4 of section 4.2 of the paper.
 
@@ -1249,11 +1535,8 @@ def divide(
         parameters: Those that CEPs are added to, (L, 5).
         setup: Frame and target of the one set-up.
         workspace: Called on the calling thread; what it raises ends the division.
-        options: low and high (F,), corners of the workspace; accuracy, the demanded one in m; regions, leaves
-            at most; halving "longest" side or "best" axis; order "worst" or "breadth" first; poses a region;
-            limit of kappa(M); seed.
-        measuring: candidates and tests, poses to choose from and to judge by in each region; criterion and
-            passes as for `choose_poses`; orientation, whether it is measured.
+        options: Corners, accuracy, numbers and order.
+        measuring: What is measured in each region.
 
     Raises:
         CoreError: The whole workspace has too few or ill-conditioned poses, or a number is out of range.
@@ -1265,7 +1548,7 @@ def divide_rows(
     setup: Setup,
     features: NDArray[np.float64],
     judges: NDArray[np.bool_],
-    options: Mapping[str, Any],
+    options: DivisionOptions,
 ) -> Division:
     """Divide a workspace by measurements that were made already.
 
@@ -1275,5 +1558,5 @@ def divide_rows(
         setup: Frames and targets.
         features: Of each measurement, (n, F).
         judges: Which of them judge and take no part in any fit, (n,).
-        options: As for `divide`; poses is the least number that a region needs.
+        options: As for `divide`.
     """

@@ -37,7 +37,7 @@ from truearm.fits.fitting import (
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts, sureness
 from truearm.fits.models import NOMINAL, VARIABLE
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.fits.schemes import NETWORKS, REGIONS
 from truearm.intervals import interval_coverage
@@ -65,7 +65,7 @@ REFIT_ASTRAY: Final = "refit_astray"
 def calibrate(
     robot: Robot,
     data: Measurements | Sequence[Measurements],
-    options: Options | None = None,
+    options: CalibrationOptions | None = None,
     *,
     threads: int | None = None,
     stages: Stages = no_stages,
@@ -86,7 +86,7 @@ def calibrate(
         InputError: If the data cannot be of this arm, or cannot be split as asked for.
         WorkError: If the rows determine too little.
     """
-    chosen = kinds.chosen(Options, options, more, Options.of)
+    chosen = kinds.chosen(CalibrationOptions, options, more, CalibrationOptions.of)
     robot = kinds.required(robot, Robot, "the robot")
     given, notices = admitted(Measurements.of(data), robot)
     notices += [*stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
@@ -137,7 +137,9 @@ def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation)
     return [*order_notices(task, data, drift.progress), *drift_notices(judged.drift)]
 
 
-def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:
+def _task(
+    robot: Robot, data: Measurements, options: CalibrationOptions, threads: int | None, stages: Stages
+) -> Task:
     _check_train_on(options)
     selection = select(data, options.use, options.judge_target)
     where = ", ".join(data.files)
@@ -162,7 +164,7 @@ def _task(robot: Robot, data: Measurements, options: Options, threads: int | Non
     return Task(arm, selection, data.groups, options, threads, stages)
 
 
-def _check_train_on(options: Options) -> None:
+def _check_train_on(options: CalibrationOptions) -> None:
     if options.model == REGIONS and options.scheme.train_on != SchemeOptions.train_on:
         raise UsageError(
             f'"{options.scheme.train_on}" with the model {REGIONS}',

@@ -24,7 +24,7 @@ from truearm.fits.identifiability import Identifiability
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import CONSTANT, ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.inputs import Features, feature_columns
 from truearm.judgement.held_rows import HeldRows
@@ -80,7 +80,7 @@ class Calibration:
     """
 
     robot: Robot
-    options: Options
+    options: CalibrationOptions
     groups: tuple[str, ...]
     selection: Selection
     measured: MeasuredParts
@@ -331,7 +331,7 @@ class Calibration:
 
         Raises:
             WorkError: If a pose is not reached within the joint limits, or on another branch than the seed's.
-            InputError: If targets, seed or tool are none.
+            InputError: If targets, seed or tool are not finite numbers of these shapes, or not rigid.
         """
         return solve(self, base_from_tool, seed, tool=tool, task=task, features=features)
 

@@ -170,7 +170,8 @@ class Compensator:
                 object, for another than it is had an arm whose flange, or base, is shifted by as much.
 
         Raises:
-            InputError: If the readings or the tool are none, or the author's arm has other joints.
+            InputError: If readings or tool are not finite numbers of these shapes, or the author's arm has
+                other joints.
         """
         rows, _ = as_rows(q, self.programming.joint_count, what="joint readings")
         meant = None if author is None else required(author, Robot, "the author's arm")
@@ -190,7 +191,7 @@ class Compensator:
             tool: As for `joints`.
 
         Raises:
-            InputError: If targets, seed or tool are none.
+            InputError: If targets, seed or tool are not finite numbers of these shapes, or not rigid.
         """
         poses, _ = as_transforms(base_from_tool, what="the poses")
         seeds, flange_from_tool = as_seed(self.programming, seed, len(poses)), self._tool(tool)
@@ -210,7 +211,7 @@ class Compensator:
 
         Raises:
             WorkError: If it is refused.
-            InputError: If the readings or the tool are none.
+            InputError: If readings or tool are not finite numbers of these shapes.
         """
         try:
             readings = as_numbers(q, what="joint readings")

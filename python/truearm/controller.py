@@ -95,7 +95,7 @@ class Controller:
             tool: flange_from_tool (4, 4), or a point (3,); the flange itself by default.
 
         Raises:
-            InputError: If the readings or the tool are none.
+            InputError: If readings or tool are not finite numbers of these shapes.
         """
         flange_tool = np.eye(4) if tool is None else at_tool(self.robot, tool)
         values = np.atleast_2d(self.robot.joints_from_readings(q))

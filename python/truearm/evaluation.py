@@ -124,16 +124,16 @@ class Evaluation:
     finds: tuple[str, ...] = ("frame", "tool")
 
     def __repr__(self) -> str:
-        divided = f"frame of {self.rows_of_frame}, {self.rows_judged} judged"
+        divided = f"frame of {self.frame_in_words}, {self.judged_in_words} judged"
         return f"<Evaluation: {divided}; {means_in_words(self.errors)}>"
 
     @property
-    def rows_of_frame(self) -> str:
+    def frame_in_words(self) -> str:
         """How many found what was not kept: "50 rows", or "5 poses (50 rows)"."""
         return rows_in_words(self.n_frame, self.n_frame_poses)
 
     @property
-    def rows_judged(self) -> str:
+    def judged_in_words(self) -> str:
         """How many were judged: "100 rows", or "10 poses (100 rows)"."""
         return rows_in_words(self.n_judged, self.n_judged_poses)
 

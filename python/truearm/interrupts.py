@@ -13,6 +13,8 @@ from types import FrameType
 from typing import Final
 
 LOOKS_EVERY_S: Final = 0.05
+INTERRUPTED: Final = 130
+"""Status of a process that such a signal ended."""
 
 
 class Asked:

@@ -117,7 +117,7 @@ def whole_numbers(values: object, name: str) -> tuple[int, ...]:
     """Whole numbers that the option `name` holds, one or several.
 
     Raises:
-        UsageError: If they are none.
+        UsageError: If it is not a list of whole numbers.
     """
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise UsageError(f"{name} is {values!r}", rule="It must be a list of whole numbers")
@@ -128,7 +128,7 @@ def words(value: object, name: str) -> tuple[str, ...]:
     """Names that the option `name` holds, as one text with commas or one by one.
 
     Raises:
-        UsageError: If they are none.
+        UsageError: If it is neither a text nor a list of texts.
     """
     if isinstance(value, str):
         return tuple(part.strip() for part in value.split(","))

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from truearm.errors import UsageError
 from truearm.kinds import check_number
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD, RADIANS_PER_DEGREE
+
+if TYPE_CHECKING:
+    from truearm._core import CorrectorBounds
 
 Task = Literal["pose", "axis", "position"]
 TASKS: Final = ("pose", "axis", "position")
@@ -61,7 +64,7 @@ class Limits:
                     way_out="None switches it off, and inf on the command line",
                 )
 
-    def core(self, robot: Robot) -> dict[str, Any]:
+    def core(self, robot: Robot) -> "CorrectorBounds":
         """Internal: the keywords of the core, SI, for an arm."""
         mm, mrad = 1.0 / MM_PER_METRE, 1.0 / MRAD_PER_RAD
         return {

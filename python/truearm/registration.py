@@ -1,4 +1,4 @@
-"""The frame of a set-up in closed form, where its targets on the tool are known."""
+"""Points of a set-up: its frame in closed form, where its targets on the tool are known, and their spread."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,3 +30,8 @@ def register(
     world_from_base[:3, :3] = u @ keep @ vt
     world_from_base[:3, 3] = middle_world - world_from_base[:3, :3] @ middle_base
     return world_from_base
+
+
+def spread_m(points: Floats) -> float:
+    """Median distance of points (n, 3) from their median point, m; one that is far off does not count."""
+    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))

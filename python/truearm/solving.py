@@ -1,7 +1,7 @@
 """Models of an arm in the core's terms, and readings for poses: inverse kinematics from a seed."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from truearm.measurements import Measurements
 from truearm.robot import Robot
 
 if TYPE_CHECKING:
+    from truearm._core import CorrectorOptions
     from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
@@ -86,7 +87,9 @@ def moving_joints(robot: Robot, moving: Sequence[int] | None) -> tuple[int, ...]
     return tuple(int(joint) for joint in joints)
 
 
-def core_options(robot: Robot, task: Task, moving: tuple[int, ...] | None, limits: Limits) -> dict[str, Any]:
+def core_options(
+    robot: Robot, task: Task, moving: tuple[int, ...] | None, limits: Limits
+) -> "CorrectorOptions":
     """The core's options, with joints counted from 0.
 
     Args:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,9 @@ from truearm.errors import InputError, UsageError, list_names
 from truearm.kinds import check_number, check_values, settle
 from truearm.named_values import check_readings
 from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm import _core
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +55,7 @@ class StreamOptions:
                     f"{value:g}", where=name, rule="It must be positive", way_out="inf switches it off"
                 )
 
-    def core(self) -> dict[str, object]:
+    def core(self) -> "_core.StreamOptions":
         """Internal: the core's options, SI."""
         return {
             "rate": [np.radians(self.rate_deg_s), self.rate_mm_s / MM_PER_METRE],

@@ -151,7 +151,7 @@ impl FieldFit {
         matrix(py, &self.core.residuals, self.rows)
     }
 
-    /// Each pose's leave-one-out deviation in typical ones, (n,).
+    /// Each pose's squared standardised leave-one-out residual over the squared limit, (n,).
     #[getter]
     fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         vector(py, &self.core.judgement.score)
@@ -188,7 +188,7 @@ impl FieldFit {
         self.core.stood_aside
     }
 
-    /// The posterior of the fit itself.
+    /// What the rows leave uncertain: the posterior under widened amplitudes.
     #[getter]
     fn posterior(&self) -> Posterior {
         Posterior { held: Held::Fitted(Arc::clone(&self.core)) }

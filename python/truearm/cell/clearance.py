@@ -14,12 +14,12 @@ from truearm._core import Clearance as Gaps
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.panel import Panel
 from truearm.fits.parameters import A, D
+from truearm.planning.folding import SHORTEST_LINK_M
 from truearm.robot import Robot
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-SHORTEST_LINK_M: Final = 1e-6
 # How far the plate reaches beyond the effective area.
 RIM_M: Final = 0.02
 # Middle and end of the tool.

@@ -12,12 +12,12 @@ from pydantic import field_validator
 from truearm.cell.channels import Channel, ConnectionEndedError, open_channel, tcp_place
 from truearm.cell.device_errors import DeviceError, DeviceSilentError, gone, silent, stopped
 from truearm.cell.schema import Frame, Positive, Section
+from truearm.cell.shown import LONGEST_SHOWN
 from truearm.errors import count_of
 
 LONGEST_LINE: Final = 65536
 ENDS: Final = (b"\r", b"\n")
 TERMINATORS: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
-LONGEST_SHOWN: Final = 60
 PASSES_EVERY_S: Final = 0.05
 T = TypeVar("T")
 

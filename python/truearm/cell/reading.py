@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from truearm.arrays import rotation_fault
 from truearm.cell.device_errors import MEND_THE_DRIVER, MalformedReadingError
+from truearm.cell.shown import shown
 from truearm.tables.columns import PURPOSE, means_something
 
 Floats = NDArray[np.float64]
 
 TRUTHS: Final = (bool, np.bool_)
 TOLERANCE: Final = 1e-3
-LONGEST_SHOWN: Final = 60
 OWN_COLUMNS: Final = ("step", "pose", PURPOSE, "approach", "readings", "temperature_c")
 """Columns of a session's measurements beside those that measurement files know."""
 NOT_FINITE: Final = "the driver gave a point that is not finite"
@@ -82,12 +82,12 @@ def checked_reading(reading: object) -> Reading:
         MalformedReadingError: If it is no reading, or a part of it is not what Reading says.
     """
     if not isinstance(reading, Reading):
-        raise _wrong(f"measure gave {_shown(reading)}", "It gives a Reading, valid or not")
+        raise _wrong(f"measure gave {shown(reading)}", "It gives a Reading, valid or not")
     if not isinstance(reading.valid, TRUTHS):
-        raise _wrong(f"valid is {_shown(reading.valid)}", "It is True or False")
+        raise _wrong(f"valid is {shown(reading.valid)}", "It is True or False")
     for key, text in (("raw", reading.raw), ("reason", reading.reason)):
         if not isinstance(text, str):
-            raise _wrong(f"{key} is {_shown(text)}", "It is text")
+            raise _wrong(f"{key} is {shown(text)}", "It is text")
     valid, reason, point = bool(reading.valid), str(reading.reason), reading.point_in_world
     if point is None and valid:
         raise _wrong("a valid reading has no point", "Where nothing was measured valid is False")
@@ -108,11 +108,11 @@ def checked_reading(reading: object) -> Reading:
 
 def _features(features: object) -> dict[str, float]:
     if not isinstance(features, dict):
-        raise _wrong(f"features are {_shown(features)}", "They are numbers by name")
+        raise _wrong(f"features are {shown(features)}", "They are numbers by name")
     taken = [name for name in features if not isinstance(name, str) or is_column(name)]
     if taken:
         raise _wrong(
-            f"a feature is called {_shown(taken[0])}", "Names of columns of a measurement file are taken"
+            f"a feature is called {shown(taken[0])}", "Names of columns of a measurement file are taken"
         )
     return {str(name): _number(value, f'feature "{name}"') for name, value in features.items()}
 
@@ -128,7 +128,7 @@ def _array(value: Any, shape: tuple[int, ...], what: str) -> Floats:  # noqa: AN
     try:
         found = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise _wrong(f"{what} is {_shown(value)}", f"It is an array {shape} of numbers") from None
+        raise _wrong(f"{what} is {shown(value)}", f"It is an array {shape} of numbers") from None
     if found.shape != shape:
         raise _wrong(f"{what} has the shape {found.shape}", f"It is an array {shape} of numbers")
     return found
@@ -153,14 +153,9 @@ def _number(value: Any, what: str) -> float:  # noqa: ANN401 - whatever a driver
     except (TypeError, ValueError, OverflowError):
         number = None
     if number is None:
-        raise _wrong(f"{what} is {_shown(value)}", "It is a number")
+        raise _wrong(f"{what} is {shown(value)}", "It is a number")
     return number
 
 
 def _wrong(what: str, rule: str) -> MalformedReadingError:
     return MalformedReadingError(what, rule=rule, way_out=MEND_THE_DRIVER)
-
-
-def _shown(value: object) -> str:
-    shown = repr(value)
-    return shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]} ..."

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.cell.cell_file import Cell
 from truearm.cell.line_sensor import LineSensor
 from truearm.errors import WorkError
-from truearm.registration import register
+from truearm.registration import register, spread_m
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.units import MM_PER_INCH, MM_PER_METRE, STATED_LENGTH_UNITS
 
@@ -80,7 +80,7 @@ def _check_unit(cell: Cell, points: Floats, in_base: Floats) -> None:
     """Raise if points are as much farther apart than the nominal arm has them as two units differ."""
     settings = cell.sensor_settings
     stated = settings.length_unit if isinstance(settings, LineSensor.Settings) else "m"
-    apart, nominal = _apart(points), _apart(in_base)
+    apart, nominal = spread_m(points), spread_m(in_base)
     if min(apart, nominal) <= 0.0:
         return
     off = {unit: abs(np.log(apart / nominal * size / UNITS_MM[stated])) for unit, size in UNITS_MM.items()}
@@ -101,11 +101,6 @@ def _check_unit(cell: Cell, points: Floats, in_base: Floats) -> None:
         rule=rule,
         way_out=way_out,
     )
-
-
-def _apart(points: Floats) -> float:
-    """How far points (n, 3) typically are from their middle, m; one that is far off does not count."""
-    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
 
 
 def _check_spread(points: Floats) -> None:

@@ -12,10 +12,9 @@ import time
 from typing import Final
 
 from truearm.cell.measuring import Process
-from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
+from truearm.interrupts import INTERRUPTED, LOOKS_EVERY_S, Asked, asked_by
 
 ENDS_WITHIN_S: Final = 1.6
-INTERRUPTED: Final = 130
 
 
 def run(process: Process) -> str:

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from truearm.cell.shown import shown
 from truearm.errors import InputError
 
 Rows = Callable[[str], list[tuple[Any, ...]]]
 
 RECOVER: Final = "Go on from a copy of it, or recover what can be read of it: sqlite3 FILE .recover"
 PUT_BACK: Final = "Put back what was there, or go on from a copy of the file"
-LONGEST_SHOWN: Final = 60
 # The file itself may be whole: it is in use, or the disk or the rights to it are what is wrong.
 NOT_DAMAGE: Final = (
     sqlite3.SQLITE_BUSY,
@@ -224,8 +224,6 @@ HEAD: Final[dict[str, Callable[[object], bool]]] = {
 
 
 def _wrong(path: Path, place: str, column: str, value: object, words: str) -> InputError:
-    shown = repr(value)
-    shown = shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]} ..."
     return InputError(
-        f"{column} is {shown}", where=f"{path}, {place}", rule=f"It is {words}", way_out=PUT_BACK
+        f"{column} is {shown(value)}", where=f"{path}, {place}", rule=f"It is {words}", way_out=PUT_BACK
     )

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain, Conservative
+from truearm.description.robot_data import OPEN_REACH_M
 from truearm.fits.fitting import feature_values
 
 if TYPE_CHECKING:
+    from truearm._core import BoundsPlan
     from truearm.calibration import Calibration
     from truearm.robot import Robot
 
@@ -32,12 +34,11 @@ ENDS: Final = 0.1
 BEYOND: Final = 0.5
 """Features are bounded so far beyond what was measured, as a share of its range: another day is warmer."""
 SEED: Final = 0
-AT_ONCE: Final = 128
+BATCH: Final = 128
 """Configurations, or up to twice as many, between which an interrupt is heard: of thousands of poses half a
 second."""
 TOGETHER: Final = 3
 """So many joints, those that place the wrist, are tabulated together as well."""
-OPEN_REACH_M: Final = 0.5
 PRIOR_MARGIN: Final = 1.1
 """Over the largest prior seen: it is sampled as well."""
 FLANGE: Final = (0.0, 0.0, 0.0)
@@ -104,7 +105,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     (fitted, prior), (fresh, _) = (_exact(calibration, centre, reach.draw(count, rng)) for _ in range(2))
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot
-    plan = {
+    plan: BoundsPlan = {
         "angles": robot.revolute.tolist() + [False] * len(calibration.options.features),
         "ranges": _input_ranges(robot, reach.limits),
         "together": list(range(min(TOGETHER, robot.joint_count))),
@@ -149,7 +150,7 @@ def _exact(calibration: "Calibration", centre: Floats, drawn: Floats) -> tuple[t
     joints = calibration.robot.joint_count
     names = calibration.options.features
     parts = []
-    for rows in np.array_split(drawn, max(len(drawn) // AT_ONCE, 1)):
+    for rows in np.array_split(drawn, max(len(drawn) // BATCH, 1)):
         features = dict(zip(names, rows[:, joints:].T, strict=True))
         parts.append(calibration.pose_variances(rows[:, :joints], centre, features))
     inputs, exact, prior = (np.concatenate(part) for part in zip(*parts, strict=True))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-AT_ONCE: Final = 512
+BATCH: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
 """Of the base, and of the tool's place."""
@@ -317,8 +317,8 @@ class UpdatedSpread:
                 self._own_rows(jacobian, setup), self.of_all
             )
         found = np.empty((len(jacobian), *jacobian.shape[1:2] * 2))
-        for first in range(0, len(jacobian), AT_ONCE):
-            some = slice(first, first + AT_ONCE)
+        for first in range(0, len(jacobian), BATCH):
+            some = slice(first, first + BATCH)
             own = None if setup is None else setup[some]
             found[some] = self._carried_each(inputs[some], jacobian[some], own)
         return found

@@ -10,7 +10,7 @@ from truearm.errors import list_names, typed
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
-    from truearm.fits.options import Options
+    from truearm.fits.options import CalibrationOptions
     from truearm.measurements import Measurements
     from truearm.updating import UpdateOptions
 
@@ -128,7 +128,7 @@ def calibrate_anew(calibration: "Calibration") -> Again:
     return Again(_command([name_of(calibration.robot), NEW_FILE], options), tuple(calibrate_lacks(options)))
 
 
-def _command(words: list[str], options: "Options") -> str:
+def _command(words: list[str], options: "CalibrationOptions") -> str:
     """Calibrate the arm that is named from the files behind it, with the options that were no defaults."""
     given = " ".join(typed(word) for word in (*words, *option_words(options)))
     return f"truearm calibrate {given} -o result"

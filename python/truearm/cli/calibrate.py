@@ -37,7 +37,7 @@ from truearm.stages import Stages
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
-    from truearm.fits.options import Options
+    from truearm.fits.options import CalibrationOptions
     from truearm.measurements import Measurements
     from truearm.robot import Robot
 
@@ -89,11 +89,11 @@ def command(
       truearm calibrate arm.toml monday.csv tuesday.csv -o result
       truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
-    from truearm.fits.options import Options
+    from truearm.fits.options import CalibrationOptions
     from truearm.measurements import Measurements
     from truearm.robot import Robot
 
-    options = Options.of(
+    options = CalibrationOptions.of(
         holdout=_holdout(holdout, holdout_range),
         seed=seed,
         train_size=train_size,
@@ -138,7 +138,9 @@ def command(
     suggest_next(calibration, output / CALIBRATION_NAME)
 
 
-def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads: int | None) -> "Calibration":
+def _calibrated(
+    arm: "Robot", data: "Measurements", options: "CalibrationOptions", threads: int | None
+) -> "Calibration":
     """Calibrate, telling of the stages."""
     from truearm.calibrating import calibrate
 

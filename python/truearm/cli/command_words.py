@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from truearm.fits.options import Options
+    from truearm.fits.options import CalibrationOptions
     from truearm.updating import UpdateOptions
 
 RENAMED: Final = {"most_regions": "regions"}
@@ -15,7 +15,7 @@ SAID_OTHERWISE: Final = frozenset({"by_purpose", "refit"})
 """Options that the command has another option for."""
 
 
-def option_words(options: "Options") -> list[str]:
+def option_words(options: "CalibrationOptions") -> list[str]:
     """The options as `truearm calibrate` takes them, those that are no defaults."""
     from truearm.cli.calibrate import command
 
@@ -27,7 +27,7 @@ def option_words(options: "Options") -> list[str]:
     return words if options.refit else [*words, *_given("no_refit", value=True)]
 
 
-def calibrate_lacks(options: "Options") -> list[str]:
+def calibrate_lacks(options: "CalibrationOptions") -> list[str]:
     """A sentence on options that `truearm calibrate` cannot be told, if there are any."""
     from truearm.cli.calibrate import command
 
@@ -49,10 +49,10 @@ def update_lacks(options: "UpdateOptions") -> list[str]:
     return _lacking(command, _of_update(options), "update")
 
 
-def _of_calibrate(options: "Options") -> dict[str, Any]:
-    from truearm.fits.options import Options
+def _of_calibrate(options: "CalibrationOptions") -> dict[str, Any]:
+    from truearm.fits.options import CalibrationOptions
 
-    return _unusual(options.to_dict(), Options().to_dict())
+    return _unusual(options.to_dict(), CalibrationOptions().to_dict())
 
 
 def _of_update(options: "UpdateOptions") -> dict[str, Any]:

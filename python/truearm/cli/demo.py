@@ -58,7 +58,7 @@ def command(
     check_directory(output)
     make_directory(output)
     text = demonstration_cell(speed)
-    plan = _planned(text, count, output, quiet=as_json)
+    plan = _planned(text, count, quiet=as_json)
     data = _measured(text, plan, output, quiet=as_json)
     calibration, summary = _calibrated(data, output, quiet=as_json)
     followed = _compensated(text, calibration, data, plan, output)
@@ -71,7 +71,7 @@ def command(
     _print_places(output)
 
 
-def _planned(text: str, count: int, output: Path, *, quiet: bool) -> "Plan":
+def _planned(text: str, count: int, *, quiet: bool) -> "Plan":
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import PlanOptions, plan_poses
 

@@ -78,8 +78,8 @@ def command(
     if as_json:
         print_json(found.to_dict())
         return
-    say(f"{known.robot.name}: {_found_words(found)}, {found.rows_judged} judged.")
-    print_errors(found.errors, found.rows_judged)
+    say(f"{known.robot.name}: {_found_words(found)}, {found.judged_in_words} judged.")
+    print_errors(found.errors, found.judged_in_words)
     others = " ".join(map(typed, measurements))
     update = f"truearm update {typed(calibration)} {others}{given_options(context, *NOT_OF_UPDATE)}"
     suggest(
@@ -93,18 +93,18 @@ def _found_words(found: "Evaluation") -> str:
     if not found.finds:
         return "frame and tool kept"
     the = "the " if len(found.finds) == 1 else ""
-    return f"{found.rows_of_frame} found {the}{' and '.join(found.finds)}"
+    return f"{found.frame_in_words} found {the}{' and '.join(found.finds)}"
 
 
 def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update: str) -> list[str]:
     """What to do with a calibration that was judged: `update` it where the arm is not as it was."""
     from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
-    from truearm.doubts.at_once import AT_ONCE
+    from truearm.doubts.at_once import STEP_KINDS
     from truearm.doubts.gross_rows import FAR_ROWS
     from truearm.doubts.of_results import OF_NO_USE
 
     kinds = {notice.kind for notice in found.notices}
-    if kinds & set(AT_ONCE):
+    if kinds & set(STEP_KINDS):
         return []
     if NOT_AS_CALIBRATED in kinds:
         return [update] if can_be_updated(known) else []

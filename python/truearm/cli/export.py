@@ -64,10 +64,10 @@ def command(
       truearm export arm.calib --to field-csv --grid q2=-90:0:19 -o field.csv
     """
     from truearm.calibration import Calibration
-    from truearm.exporting import Options, export
+    from truearm.exporting import ExportOptions, export
 
     check_output(output, calibration, None if urdf is None else str(urdf))
-    options = Options(
+    options = ExportOptions(
         urdf=urdf,
         kinematics_hash=kinematics_hash,
         grid=grid,

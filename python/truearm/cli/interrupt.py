@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, NoReturn
 
-from truearm.cli.console import INTERRUPTED, tell
+from truearm.cli.console import tell
 from truearm.cli.display import put_away
-from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
+from truearm.interrupts import INTERRUPTED, LOOKS_EVERY_S, Asked, asked_by
 
 GRACE_S: Final = 0.6
 

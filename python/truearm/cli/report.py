@@ -83,7 +83,7 @@ def command(
     say_wrapped(made.verdict)
     if other is not None:
         say(f"On {', '.join(file.name for file in files)}:")
-        print_errors(other.errors, other.rows_judged)
+        print_errors(other.errors, other.judged_in_words)
     if made.advice:
         say("What would help most next:")
         for entry in made.advice:

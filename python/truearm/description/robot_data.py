@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 MIN_COUPLING_DETERMINANT: Final = 1e-9
 TRANSFORMS: Final = ("base", "flange", "tool")
+OPEN_REACH_M: Final = 0.5
+"""How far from zero a joint that slides is taken to go where it has no limit."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class RobotData:
         """Which joints turn (N,); the others slide."""
         return np.array([kind == "revolute" for kind in self.joints])
 
-    def finite_limits(self, open_m: float) -> tuple[Floats, Floats]:
+    def finite_limits(self, open_m: float = OPEN_REACH_M) -> tuple[Floats, Floats]:
         """Lowest and highest readings (N,); where there is no limit, half a turn or `open_m` from zero."""
         reach = np.where(self.revolute, np.pi, open_m)
         low, high = self.limits.T

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.arrays import as_numbers, as_transforms
-from truearm.description.robot_data import Payload, RobotData
+from truearm.description.robot_data import TRANSFORMS, Payload, RobotData
 from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
 
 TEXTS: Final = ("name", "source", "convention")
-TRANSFORMS: Final = ("base", "flange", "tool")
 ARRAYS: Final = ("table", *TRANSFORMS, "coupling")
 
 

@@ -24,7 +24,7 @@ def table_fields(
     """All fields of a Robot but its name, source and convention; arguments as in Robot.from_table.
 
     Raises:
-        InputError: If the table is none, or has not as many rows as there are joints.
+        InputError: If the table is not finite numbers (N, 4) or (N, 5), a row of each joint.
     """
     rows = _rows(table)
     count = len(rows)

@@ -32,8 +32,8 @@ def check_urdf(text: str) -> None:
     """Check what a parser would stumble over.
 
     Raises:
-        InputError: If the text is not XML or no URDF, is xacro that was not expanded, a number is none, a
-            joint has no name, type, parent or child, or names a link that there is not, two joints or
+        InputError: If the text is not XML or no URDF, is xacro that was not expanded, a number cannot be
+            read, a joint has no name, type, parent or child, or names a link that there is not, two joints or
             links have one name, or an angle can only be in degrees.
     """
     elements = _Elements()

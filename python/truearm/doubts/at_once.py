@@ -21,7 +21,7 @@ FRAME: Final = "frame"
 TARGET_SLIPPED: Final = "target_slipped"
 JOINT_MOVED: Final = "joint_moved"
 SETUP_TURNED: Final = "setup_turned"
-AT_ONCE: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED)
+STEP_KINDS: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED)
 """Kinds of notices of what stands otherwise from some row on."""
 AXES: Final = 3
 BESIDE: Final = 5

@@ -8,9 +8,8 @@ import numpy as np
 
 from truearm.doubts.nominal_misfit import Seen
 from truearm.robot import Robot
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_INCH, MM_PER_METRE
 
-MM_PER_INCH: Final = 25.4
 DEG_PER_RAD: Final = 180.0 / np.pi
 LENGTHS: Final = (
     (MM_PER_METRE, "metres taken for mm"),

@@ -18,7 +18,7 @@ from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, po
 from truearm.doubts.slips import Slip
 from truearm.doubts.whitened import AXES, Whitened
 from truearm.errors import Notice, count_of
-from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
 from truearm.inputs import is_payload
 from truearm.lengths import length_mm
 from truearm.tables.columns import OF_MEASURING
@@ -28,8 +28,6 @@ Floats = NDArray[np.float64]
 
 UNUSED_COLUMN: Final = "unused_column"
 JOINTS_MOVED: Final = "joints_moved"
-OVERWHELMING: Final = 1e-6
-"""Chance explains as much in less than so many calibrations, however many columns are asked."""
 ORDER: Final = ""
 """Name of the order of the rows among the columns."""
 MOSTLY: Final = 0.5

@@ -10,6 +10,7 @@ from truearm._core import Chain, ConstantFit, CoreError, Problem, Setup, fit_con
 from truearm.fits.core_set import measured_points
 from truearm.fits.fitting import fit_options
 from truearm.measurements import Measurements
+from truearm.registration import spread_m
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -115,11 +116,6 @@ class NominalArm:
         """That of frame and target alone."""
         values = seen.readings @ self.coupling.T
         return Problem(self.chain, measured_points(values, seen.points, sigma_m=seen.sigma_m), [], False)
-
-
-def spread_m(points: Floats) -> float:
-    """Median distance of points (n, 3) from their median point, m."""
-    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
 
 
 def relative_misfit(robot: Robot, seen: Seen) -> float:

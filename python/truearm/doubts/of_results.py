@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.doubts.grids import BETWEEN, grid_steps, grid_words
 from truearm.doubts.held_tool import TURN_MORE, held_tool, held_words
@@ -77,7 +77,7 @@ FITS_OTHERWISE: Final = "fits_otherwise"
 COMPUTED: Final = "computed"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS, COMPUTED)
 ANOTHER_FRAME: Final = "another_frame"
-WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE, ANOTHER_FRAME, *AT_ONCE)
+WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE, ANOTHER_FRAME, *STEP_KINDS)
 """What the measurements would fit, where a calibration does not help."""
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"

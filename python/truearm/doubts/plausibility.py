@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.doubts.mixed_units import check_mixed_units
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows, spread_m
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows
 from truearm.doubts.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.doubts.unit_change import check_one_unit
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
+from truearm.registration import spread_m
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
 from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
@@ -261,7 +262,7 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
             rule="Positions are in metres unless their columns say so (x_mm)",
             way_out=_way_out_of_large(measured, nominal),
         )
-    if _could_be_radians(group, robot) and measured > 3.0 * nominal + TOOL_ALLOWANCE_M:
+    if _could_be_radians(group) and measured > 3.0 * nominal + TOOL_ALLOWANCE_M:
         raise InputError(
             found,
             where=where,
@@ -343,7 +344,7 @@ def _way_out_of_large(measured: float, nominal: float, columns: str = "x_mm, y_m
     return "Check the columns and their unit"
 
 
-def _could_be_radians(group: Measurements, robot: Robot) -> bool:
+def _could_be_radians(group: Measurements) -> bool:
     degrees = np.array(group.joint_units) == "deg"
     values = group.readings[:, degrees] / RADIANS_PER_DEGREE
     return bool(degrees.any()) and bool((np.abs(values) <= FULL_TURN).all())

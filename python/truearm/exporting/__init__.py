@@ -24,11 +24,20 @@ from truearm.solving import beyond_notices, feature_values
 Format = Literal["urdf", "ur-yaml", "dh-toml", "dh-json", "dh-csv", "field-csv"]
 FORMATS: Final = get_args(Format)
 
-__all__ = ["FORMATS", "Exported", "Format", "Options", "constant_robot", "export", "grid_axes", "grid_table"]
+__all__ = [
+    "FORMATS",
+    "ExportOptions",
+    "Exported",
+    "Format",
+    "constant_robot",
+    "export",
+    "grid_axes",
+    "grid_table",
+]
 
 
 @dataclass(frozen=True)
-class Options:
+class ExportOptions:
     """What some formats may be told.
 
     Attributes:
@@ -80,7 +89,7 @@ class Exported:
 
 
 def export(
-    calibration: Calibration, to: str, path: str | Path | None = None, options: Options | None = None
+    calibration: Calibration, to: str, path: str | Path | None = None, options: ExportOptions | None = None
 ) -> Exported:
     """Write a calibration for other software.
 
@@ -97,7 +106,7 @@ def export(
     """
     chosen = _format(to)
     calibration = required(calibration, Calibration, "the calibration")
-    given = options or Options()
+    given = options or ExportOptions()
     _check_options(chosen, given)
     made = _samples(calibration, given) if chosen == "field-csv" else _constants(calibration, chosen, given)
     if path is not None:
@@ -116,7 +125,7 @@ def _format(name: str) -> Format:
     return cast("Format", name)
 
 
-def _check_options(chosen: Format, options: Options) -> None:
+def _check_options(chosen: Format, options: ExportOptions) -> None:
     belongs = {
         "--urdf": (options.urdf, "urdf"),
         "--hash": (options.kinematics_hash, "ur-yaml"),
@@ -129,7 +138,7 @@ def _check_options(chosen: Format, options: Options) -> None:
             raise UsageError(f"{option} is given with --to {chosen}", rule=f"It belongs to --to {owner}")
 
 
-def _samples(calibration: Calibration, options: Options) -> Exported:
+def _samples(calibration: Calibration, options: ExportOptions) -> Exported:
     axes = grid_axes(calibration, options.grid)
     table = grid_table(calibration, axes, features=options.features, with_std=options.with_std)
     note = "Samples of a field are not the field: between them it is not linear"
@@ -139,7 +148,7 @@ def _samples(calibration: Calibration, options: Options) -> Exported:
     return Exported("field-csv", text, (note, *beyond), None, len(table))
 
 
-def _constants(calibration: Calibration, chosen: Format, options: Options) -> Exported:
+def _constants(calibration: Calibration, chosen: Format, options: ExportOptions) -> Exported:
     robot, nominal = constant_robot(calibration), calibration.robot
     notes, chain = field_is_lost(calibration, chosen), ""
     if chosen == "urdf":

@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 class ConstantDetails:
     """About the constant model.
 
+    `truearm.calibrate` makes one, `calibration.constant`.
+
     Attributes:
         names: Names of the constants that were fitted, in the order of the covariance.
         covariance: Of these constants, then of the set-up's unknowns, (u, u), SI, as if what constants leave
@@ -55,7 +57,7 @@ class ConstantDetails:
         standard_errors: Floats,
         scale: KnownScale,
     ) -> "ConstantDetails":
-        """Those of a fit."""
+        """Internal: those of a fit."""
         noise_m, noise_rad = fit.noise
         return cls(
             names=names,
@@ -73,6 +75,8 @@ class ConstantDetails:
 @dataclass(frozen=True, eq=False)
 class VariableDetails:
     """About the variable model.
+
+    `truearm.calibrate` makes one, `calibration.variable`.
 
     Attributes:
         hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range;
@@ -109,6 +113,8 @@ FARTHEST_SLIP_MM: Final = 20.0
 class Jump:
     """A displacement of a set-up at once.
 
+    `truearm.calibrate` makes one, as values of `calibration.validation.drift.jumps`.
+
     Attributes:
         between: The two measured rows between which it came, in words.
         mm: How far.
@@ -134,6 +140,8 @@ class Jump:
 @dataclass(frozen=True)
 class DriftDetails:
     """What the set-ups moved while they were measured, which was taken out of the measurements.
+
+    `truearm.calibrate` makes one, `calibration.validation.drift`.
 
     Attributes:
         moved_mm: How far apart each set-up that moved has been, at the most.

@@ -31,6 +31,8 @@ OVERWHELMING: Final = 1e-6
 class FittedRows:
     """n rows in the order they were fitted in.
 
+    `truearm.calibrate` makes one, `calibration.rows`.
+
     Attributes:
         data: What was measured.
         side: For each row (n,) whether it was UNUSED, TRAINED or HELD_OUT when the errors were judged.
@@ -38,7 +40,7 @@ class FittedRows:
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
             orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
             pair once.
-        score: Squared standardised residuals over the limit (n,); above one is an outlier.
+        score: Squared standardised residuals over their limit (n,); above one is an outlier.
         distance_m: How far the farthest target of each row is from where the model has it (n,). A distance is
             off by so much in its row, in both of a pair; those of a calibration are judged by constants that
             rows far off do not bend, as are their scores.
@@ -67,7 +69,7 @@ class FittedRows:
 
     @classmethod
     def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":
-        """The rows of a fit; `side` (n,) in their order."""
+        """Internal: the rows of a fit; `side` (n,) in their order."""
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from truearm.fits.enough_values import check_enough, check_set_ups, setup_unknow
 from truearm.fits.identifiability import Identifiability, identify
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.fits.schemes import SCHEMES
 from truearm.inputs import is_payload
@@ -32,6 +32,9 @@ from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_pose
 from truearm.stages import Stages, no_stages
+
+if TYPE_CHECKING:
+    from truearm._core import ConstantOptions, FieldOptions
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
@@ -93,7 +96,7 @@ class Task:
     arm: IdentifiedArm
     selection: Selection
     groups: Sequence[str]
-    options: Options
+    options: CalibrationOptions
     threads: int | None = None
     stages: Stages = no_stages
     sizes: tuple[int, ...] = ()
@@ -224,8 +227,8 @@ def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> 
         options = fit_options(task.threads, prior=task.options.prior, robust=task.options.robust)
         constant = fit_constant(chosen, options)
         for start in task.starts:
-            near = {"parameters": start.parameters, "start": start.setup, "noise": start.noise}
-            other = fit_constant(chosen, {**options, **near})
+            options |= {"parameters": start.parameters, "start": start.setup, "noise": start.noise}
+            other = fit_constant(chosen, options)
             if _typically_left(other) < OTHER_MINIMUM * _typically_left(constant):
                 constant = other
     return _Constants(nominal, found, constant)
@@ -318,7 +321,7 @@ def fit_options(
     prior: tuple[float, float, bool] | None = None,
     robust: str | None = None,
     parameters: Floats | None = None,
-) -> dict[str, Any]:
+) -> "ConstantOptions":
     """The core's options of a constant fit; `parameters` (n, L, 5) are the arm where it is not fitted."""
     return {
         "prior": prior,
@@ -332,7 +335,7 @@ def fit_options(
 
 def field_options(
     task: Task, names: Sequence[str], features: Floats, ranges: Sequence[float], known: KnownHyper
-) -> dict[str, Any]:
+) -> "FieldOptions":
     """The core's options of a field.
 
     Args:

@@ -15,6 +15,8 @@ Confounded = tuple[int, Sequence[tuple[int, float]], bool]
 class Identifiability:
     """What the data says about the arm's candidates for constants.
 
+    `truearm.calibrate` makes one, `calibration.identifiability`.
+
     Attributes:
         parameters: How many were asked for.
         determined: Names of those the data determines.

@@ -12,6 +12,8 @@ Floats = NDArray[np.float64]
 class KnownScale:
     """What an update compares new rows with; it stays what it was when the calibration is updated.
 
+    `truearm.calibrate` makes one, `calibration.constant.scale`.
+
     Attributes:
         freedom: Degrees of freedom that the scale of standard deviations is known from.
         sigma_m: What half of the rows state as their sigma, or less, m; zero where none does, None in files
@@ -32,7 +34,7 @@ class KnownScale:
     def of(
         cls, residual: Floats, rank: int, stated: Floats | None, common: float, widened: float = 1.0
     ) -> "KnownScale":
-        """That of residuals, zero where not measured, with `rank` unknowns and stated sigmas (n,), m."""
+        """Internal: that of residuals, zero where not measured, `rank` unknowns and stated sigmas (n,), m."""
         told = np.empty(0) if stated is None else stated[np.isfinite(stated)]
         usual = float(np.median(told)) if len(told) else 0.0
         return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)

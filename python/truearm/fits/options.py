@@ -31,7 +31,7 @@ POSITIVE: Final = ("prior_mm", "prior_mrad", "parallel_within_deg", "repeatabili
 
 
 @dataclass(frozen=True)
-class Options:
+class CalibrationOptions:
     """How to calibrate.
 
     Attributes:
@@ -94,7 +94,7 @@ class Options:
         return self.prior_mm / MM_PER_METRE, self.prior_mrad / MRAD_PER_RAD, True
 
     @classmethod
-    def of(cls, **given: Any) -> "Options":
+    def of(cls, **given: Any) -> "CalibrationOptions":
         """Options from keywords: those of this class, of SplitRule and of SchemeOptions, side by side.
 
         A stated `holdout` comes before what poses were planned for, unless `by_purpose` is stated as well.

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from truearm.fits.scheme_options import SchemeOptions
 from truearm.fits.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
 from truearm.fits.stillness import still_joints, still_words
 from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm._core import DivisionOptions, NetworkFitOptions, RegionalOptions
 
 Floats = NDArray[np.float64]
 
@@ -150,7 +153,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
     parameters, setup = rows.constant.parameters, rows.constant.setup
     judges = np.random.default_rng([rows.seed, len(features)]).uniform(size=len(features)) < JUDGING_SHARE
     jacobian, _ = linearise(rows.problem, parameters, setup)
-    division = {
+    division: DivisionOptions = {
         "low": features.min(axis=0),
         "high": features.max(axis=0),
         "accuracy": options.demanded_mm / MM_PER_METRE,
@@ -162,7 +165,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
         "seed": rows.seed,
     }
     regions = divide_rows(rows.problem, parameters, setup, features, judges, division).regions
-    how = {"method": options.region_ceps, "prior": None}
+    how: RegionalOptions = {"method": options.region_ceps, "prior": None}
     fit = regional_ceps(regions, rows.problem, parameters, setup, features, how)
     leaves = regions.leaves
     kappa = fit.kappa[leaves][np.isfinite(fit.kappa[leaves])]
@@ -192,7 +195,7 @@ def _train_on_ceps(
 def _fit_on_measurements(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit:
     jacobian, residual = linearise(rows.problem, rows.constant.parameters, rows.constant.setup)
     _, features = _features(rows, options)
-    how = {"columns": list(rows.columns), "scales": None, "threads": None}
+    how: NetworkFitOptions = {"columns": list(rows.columns), "scales": None, "threads": None}
     fitted = _empty(name, rows, options).fit(features, jacobian, residual, how)
     details = SchemeDetails(ended="noise and roughness by the largest evidence")
     return SchemeFit(_kept(name, rows, options, fitted.network), details)

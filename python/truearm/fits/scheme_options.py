@@ -3,11 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from truearm import kinds
 from truearm.errors import UsageError
 from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm._core import NetworkOptions, TrainingRule
 
 MAJOR_JOINTS: Final = (1, 2, 3)
 WHOLE: Final = ("most_regions", "region_rows", "active", "epochs", "table")
@@ -125,7 +128,7 @@ class SchemeOptions:
         _check(count <= most, "cells", association, f"At most {most}", way_out)
         _check((self.table or 1) <= MOST_ROWS, "table", f"{self.table}", f"1 to {MOST_ROWS}")
 
-    def network(self, *, fuzzy: bool) -> dict[str, Any]:
+    def network(self, *, fuzzy: bool) -> "NetworkOptions":
         """Internal: options of the core's network: the FCMAC, or the CMAC whose inputs are quantised."""
         return {
             "membership": self.membership if fuzzy else "quantised",
@@ -135,7 +138,7 @@ class SchemeOptions:
         }
 
     @property
-    def training(self) -> dict[str, Any]:
+    def training(self) -> "TrainingRule":
         """Internal: options of the core's training by (A5), without the columns."""
         return {
             "rate": self.rate,

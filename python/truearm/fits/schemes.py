@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Network, Regions
+
+if TYPE_CHECKING:
+    from truearm._core import NetworkOptions
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -65,7 +68,7 @@ class NetworkCeps:
     inputs: tuple[int, ...]
     columns: tuple[int, ...]
     network: Network
-    options: Mapping[str, Any]
+    options: "NetworkOptions"
 
     def ceps_at(self, inputs: Floats) -> Floats:
         """CEPs (n, P) at inputs (n, I)."""
@@ -97,8 +100,9 @@ def unpack(content: Mapping[str, Any], name: str, arrays: Arrays) -> Scheme:
         parts = {part: arrays[f"{name}.regions.{part}"] for part in ("low", "high", "axis", "child")}
         return RegionalCeps(inputs, columns, Regions.from_arrays(parts), arrays[f"{name}.region_ceps"])
     sensors = [(low, high, cells, c) for low, high, cells, c in content["sensors"]]
-    empty = Network(sensors, len(columns), dict(content["options"]))
-    return NetworkCeps(inputs, columns, empty.with_weights(arrays[f"{name}.weights"]), content["options"])
+    options: NetworkOptions = content["options"]
+    empty = Network(sensors, len(columns), options)
+    return NetworkCeps(inputs, columns, empty.with_weights(arrays[f"{name}.weights"]), options)
 
 
 def add_ceps(parameters: Floats, columns: Sequence[int], ceps: Floats) -> Floats:

@@ -13,7 +13,7 @@ from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed, read_text
 from truearm.fits.core_set import DISTANCE
-from truearm.fits.options import CHOICES, Options
+from truearm.fits.options import CHOICES, CalibrationOptions
 from truearm.fits.scheme_options import KNOWN
 from truearm.fleet.keys import in_keys
 from truearm.rows.splitting import RANGE_FORM
@@ -39,7 +39,7 @@ Whole = Annotated[int, Field(strict=True)]
 
 
 def _told(rule: Mapping[str, Any]) -> FieldInfo:
-    """What the schema tells of a key whose value Options checks."""
+    """What the schema tells of a key whose value CalibrationOptions checks."""
     return cast("FieldInfo", Field(json_schema_extra=dict(rule)))
 
 
@@ -140,7 +140,7 @@ class Entry:
     robot: str
     measurements: tuple[str, ...]
     previous: str | None
-    options: Options
+    options: CalibrationOptions
     section: ArmSection
     folder: Path
 
@@ -215,10 +215,10 @@ def _entry(
     )
 
 
-def _options(section: ArmSection, place: str) -> Options:
+def _options(section: ArmSection, place: str) -> CalibrationOptions:
     given = section.model_dump(exclude_none=True, exclude=set(NOT_OPTIONS))
     try:
-        return Options.of(**given)
+        return CalibrationOptions.of(**given)
     except UsageError as error:
         rule, way_out = in_keys(error.rule), in_keys(error.way_out)
         raise InputError(error.what, where=error.where, rule=rule, way_out=way_out).at(place) from None

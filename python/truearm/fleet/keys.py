@@ -4,7 +4,7 @@ import re
 from dataclasses import fields
 from typing import Final
 
-from truearm.fits.options import CHOICES, Options
+from truearm.fits.options import CHOICES, CalibrationOptions
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.rows.splitting import SplitRule
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
@@ -12,9 +12,9 @@ from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
 OPTION: Final = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: (\w+(?:\.\d+)?))?")
 NUMBER: Final = re.compile(r"\d+(?:\.\d+)?")
 UNITS: Final = {"length_unit": STATED_LENGTH_UNITS, "angle_unit": ANGLE_UNITS}
-KEYS: Final = {each.name for kind in (Options, SplitRule, SchemeOptions) for each in fields(kind)} | set(
-    UNITS
-)
+KEYS: Final = {
+    each.name for kind in (CalibrationOptions, SplitRule, SchemeOptions) for each in fields(kind)
+} | set(UNITS)
 WORDS: Final = {name: tuple(values) for name, values in {**CHOICES, **UNITS}.items()}
 
 

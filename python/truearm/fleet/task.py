@@ -8,7 +8,7 @@ from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
 from truearm.doubts.outliers import Outliers, judged_means_mm
 from truearm.doubts.points_together import points_together
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fleet.doubted import grave_notices
 from truearm.fleet.drift import check_comparable, drift_of
 from truearm.measurements import Measurements
@@ -33,7 +33,7 @@ class ArmTask:
 
     robot: Mapping[str, Any]
     data: Measurements
-    options: Options
+    options: CalibrationOptions
     previous: bytes | None
     previous_name: str
     strip: bool

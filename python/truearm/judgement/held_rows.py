@@ -26,6 +26,8 @@ FEWEST_POSES: Final = 2
 class HeldRows:
     """n rows and what each model missed there. The error of a pair's distance is at the first of its rows.
 
+    `truearm.calibrate` makes one, `calibration.held`; `truearm.evaluate` another, `evaluation.rows`.
+
     Attributes:
         readings: Joint readings (n, N), rad or m.
         rows: Number of each row in its file (n,), the first data row being 1.
@@ -49,24 +51,24 @@ class HeldRows:
 
     @classmethod
     def of(cls, data: Measurements, errors: Mapping[str, RowErrors]) -> "HeldRows":
-        """Those of judged rows."""
+        """Internal: those of judged rows."""
         return cls(data.readings, data.rows, data.sources, errors)
 
     def without(self, outliers: Sequence[Mapping[str, Any]]) -> NDArray[np.bool_]:
-        """Which rows are none of the outliers, given with file and row, (n,)."""
+        """Internal: which rows are none of the outliers, given with file and row, (n,)."""
         named = {(entry["file"], entry["row"]) for entry in outliers}
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([row not in named for row in own], dtype=bool)
 
     def sigmas_mm(self, data: Measurements) -> Floats:
-        """What each of these rows states as its sigma (n,) in the measurements it is of, mm; else zero."""
+        """Internal: what each of these rows states as its sigma (n,), mm; zero where it states none."""
         names = zip(data.sources.tolist(), data.rows.tolist(), strict=True)
         stated = dict(zip(names, (MM_PER_METRE * data.stated_sigma_m).tolist(), strict=True))
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([stated.get(row, 0.0) for row in own])
 
     def among(self, outliers: Sequence[Mapping[str, Any]], model: str) -> list[Mapping[str, Any]]:
-        """Those of the outliers, given with file and row, that are among these rows.
+        """Internal: those of the outliers, given with file and row, that are among these rows.
 
         Their distance_mm and turn_mrad are what the model missed there before it saw them, where that is
         known.
@@ -126,7 +128,7 @@ class HeldRows:
         return float(means.mean()), float(means.std(ddof=1) / math.sqrt(len(means)))
 
     def pack(self, arrays: Arrays) -> dict[str, Any]:
-        """JSON values; arrays are added to `arrays`."""
+        """Internal: JSON values; arrays are added to `arrays`."""
         known, index = np.unique(self.sources, return_inverse=True)
         arrays |= {"held.readings": self.readings, "held.rows": self.rows}
         arrays["held.sources"] = index.astype(np.int64)
@@ -138,7 +140,7 @@ class HeldRows:
 
     @classmethod
     def unpack(cls, content: Mapping[str, Any], arrays: Arrays) -> "HeldRows":
-        """The rows that `pack` described.
+        """Internal: the rows that `pack` described.
 
         Raises:
             KeyError: If an array or a key is missing.

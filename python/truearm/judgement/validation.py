@@ -31,7 +31,17 @@ MEAN_SIZE: Final = math.sqrt(2.0 / math.pi)
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of errors in mm or mrad: mean, root mean square, 95 % and 99 % quantile, largest."""
+    """Of errors in mm or mrad.
+
+    `truearm.calibrate` and `truearm.evaluate` make one of each model and what was measured.
+
+    Attributes:
+        mean: Arithmetic mean.
+        rms: Root mean square.
+        p95: Quantile of 95 %.
+        p99: Quantile of 99 %.
+        max: The largest.
+    """
 
     mean: float
     rms: float
@@ -51,6 +61,8 @@ class Statistics:
 @dataclass(frozen=True)
 class Errors:
     """Errors of one model.
+
+    `truearm.calibrate` makes one, as values of `calibration.validation.holdout`; so does `truearm.evaluate`.
 
     Attributes:
         position: Of the judged target, of several fitted ones of the first that a row holds (or of the
@@ -81,6 +93,8 @@ class Errors:
 @dataclass(frozen=True, eq=False)
 class RowErrors:
     """Errors of one model, row by row, measured minus predicted in the base frame; NaN where not measured.
+
+    `truearm.evaluate` makes one, as values of `evaluation.rows.errors`.
 
     Attributes:
         position: At the judged target (n, 3), m, of several fitted ones at the first that a row holds; of
@@ -137,6 +151,8 @@ def _measured(errors: Floats) -> Floats:
 @dataclass(frozen=True)
 class Validation:
     """Errors on rows that took no part in the fits they judge, and on those that trained.
+
+    `truearm.calibrate` makes one, `calibration.validation`.
 
     Attributes:
         n_train: Rows that trained.

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_CONTACT_DEG: Final = 15.0
-UPRIGHT: Final = np.cos(np.deg2rad(1.0))
+UPRIGHT_COSINE: Final = np.cos(np.deg2rad(1.0))
 LEVEL: Final = np.sin(np.deg2rad(1.0))
 """Cosines to the vertical of axes that are taken for vertical and for level."""
 
@@ -74,7 +74,7 @@ def standing_links(robot: Robot) -> int:
     count = 0
     for axis in axes:
         up = abs(float(axis.direction_in_base[2]))
-        if not (up > UPRIGHT if axis.kind == "revolute" else up < LEVEL):
+        if not (up > UPRIGHT_COSINE if axis.kind == "revolute" else up < LEVEL):
             break
         count += 1
     return max(1, count)
@@ -96,8 +96,8 @@ def accessible(
         tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
 
     Raises:
-        InputError: If the readings are none, a rule answers with another shape than (n,), or the tool is
-            none.
+        InputError: If readings or tool are not finite numbers of these shapes, or a rule answers with another
+            shape than (n,).
     """
     poses, _ = as_rows(readings, robot.joint_count, what=f"joint readings of {robot.name}")
     flange_from_tool = at_tool(robot, tool)

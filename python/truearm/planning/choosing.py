@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,9 @@ from truearm.fits.core_set import known_setup, measured_points
 from truearm.fits.endpoints import at_tool
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.parameters import THETA, D
+
+if TYPE_CHECKING:
+    from truearm import _core
 
 Floats = NDArray[np.float64]
 Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]
@@ -116,11 +119,12 @@ def choose(
     measured = None
     if given is not None and len(given):
         measured = unknowns_jacobian(arm, given, chosen)[0][:, :, kept]
-    how = {
+    how: _core.ChoiceOptions = {
         "columns": [columns[k] for k in kept],
         "criterion": chosen.criterion,
         "limit": chosen.limit,
         "given": None if measured is None else np.ascontiguousarray(measured),
+        "start": None,
         "passes": chosen.passes,
     }
     wanted, rng = np.ascontiguousarray(jacobian[:, :, kept]), np.random.default_rng(0)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ from truearm.fits.core_set import known_setup
 from truearm.fits.identified import IdentifiedArm
 from truearm.planning.choosing import CRITERIA, Criterion, check_some
 from truearm.planning.workspace import Workspace
+
+if TYPE_CHECKING:
+    from truearm import _core
+    from truearm._core import MeasuringOptions
 
 Floats = NDArray[np.float64]
 
@@ -74,9 +78,9 @@ class DivisionOptions:
                 way_out="Give more candidates, or fewer poses",
             )
 
-    def core(self, low: Floats, high: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
+    def core(self, low: Floats, high: Floats) -> tuple["_core.DivisionOptions", "MeasuringOptions"]:
         """Internal: the core's options of the division, and of its measuring."""
-        division = {
+        division: _core.DivisionOptions = {
             "low": low,
             "high": high,
             "accuracy": self.accuracy_m,
@@ -87,7 +91,7 @@ class DivisionOptions:
             "limit": self.limit,
             "seed": self.seed,
         }
-        measuring = {
+        measuring: MeasuringOptions = {
             "candidates": self.candidates,
             "tests": self.tests,
             "criterion": self.criterion,

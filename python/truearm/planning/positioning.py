@@ -21,7 +21,6 @@ STARTS_TRIED: Final = 3
 STEPS: Final = 12
 LARGEST_STEP: Final = 0.3
 REACHED_M: Final = 1e-9
-OPEN_REACH_M: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +88,7 @@ class PositionInverse:
 
     @cached_property
     def _starts(self) -> Floats:
-        low, high = self.robot.finite_limits(OPEN_REACH_M)
+        low, high = self.robot.finite_limits()
         readings = np.tile(np.asarray(self.held, dtype=np.float64), (STARTS, 1))
         drawn = np.random.default_rng(0).uniform(low, high, readings.shape)
         readings[:, self._columns] = drawn[:, self._columns]

@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers
 from truearm.errors import UsageError
+from truearm.fits.scheme_options import MAJOR_JOINTS
 from truearm.kinds import required, whole_numbers
 from truearm.planning.configurations import Configuration
 from truearm.planning.positioning import PositionInverse
@@ -17,8 +18,6 @@ from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-MAJOR_JOINTS: Final = (1, 2, 3)
 
 
 class Space(Protocol):

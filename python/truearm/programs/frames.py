@@ -132,14 +132,14 @@ class Frames:
             else in the arm's base.
         payloads_kg: Payloads of the tools that state one.
         where: The file, for messages; empty without one.
-        asked: What was looked up.
+        asked: Internal: what was looked up.
     """
 
     tools: Mapping[str, Frame] = field(default_factory=dict)
     objects: Mapping[str, Frame] = field(default_factory=dict)
     payloads_kg: Mapping[str, float] = field(default_factory=dict)
     where: str = ""
-    asked: Asked = field(default_factory=Asked, repr=False)
+    asked: Asked = field(default_factory=Asked, init=False, repr=False)
 
     @classmethod
     def load(cls, path: str | Path) -> "Frames":
@@ -172,8 +172,8 @@ class Frames:
         )
 
     def fresh(self) -> "Frames":
-        """The same, of which nothing was looked up."""
-        return replace(self, asked=Asked())
+        """Internal: the same, of which nothing was looked up."""
+        return replace(self)
 
     def tool(self, name: str, stated: Transform | None = None) -> Frame:
         """The tool of that name; `stated` is what the program says, if it says, and what the controller has.
@@ -188,7 +188,7 @@ class Frames:
         return self._found("object", name, stated)
 
     def held(self, kind: Kind, name: str) -> Frame | None:
-        """The tool or object of that name where the file holds it."""
+        """Internal: the tool or object of that name where the file holds it."""
         self.asked.names[kind].setdefault(name.casefold(), name)
         return self.of(kind).get(name.casefold())
 
@@ -209,7 +209,7 @@ class Frames:
         return found[0] if found else None
 
     def at_start(self, kind: Kind, name: str) -> Frame:
-        """What holds until the program sets another: asked for only where a motion has it."""
+        """Internal: what holds until the program sets another: asked for only where a motion has it."""
         self.asked.initial[kind].setdefault(name.casefold(), name)
         return self.of(kind).get(name.casefold()) or self._missing(kind, name)
 

@@ -1,7 +1,7 @@
 """Reading KRL: first what is stored under which name, then the motions in their order."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -59,6 +59,7 @@ from truearm.programs.krl_values import (
     operands,
     structure,
 )
+from truearm.programs.krl_words import BLENDING, MOTIONS, RELATIVE, SPLINE_ENDS, SPLINES
 from truearm.programs.layouts import EulerPose, Joints
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Program
@@ -70,30 +71,18 @@ if TYPE_CHECKING:
     from truearm.programs.krl import KRL
 
 OF_AXES, OF_POSES = 0, 1
-MOTIONS: Final[Mapping[str, Motion]] = {
-    "ptp": Motion.JOINT,
-    "sptp": Motion.JOINT,
-    "lin": Motion.LINEAR,
-    "slin": Motion.LINEAR,
-    "spl": Motion.LINEAR,
-    "circ": Motion.CIRCULAR,
-    "scirc": Motion.CIRCULAR,
-}
 OWN: Final = {
     "tool": re.compile(r"\$tool=stool2?\((\w+)\)"),
     "base": re.compile(r"\$base=sbase\((\w+)\.base_no\)"),
     "mode": re.compile(r"\$ipo_mode=sipo_mode\((\w+)\.ipo_frame\)"),
 }
 """Settings of a motion's own that name the frame data of an inline form."""
-RELATIVE: Final = frozenset(f"{word}_rel" for word in MOTIONS)
-BLENDING: Final = frozenset({"c_dis", "c_ptp", "c_ori", "c_vel", "c_spl"})
 ANGLE: Final = "ca"
 """Tells how far an arc goes, which then ends elsewhere than at its target."""
 OPENING: Final = {"if": False, "switch": False, "for": True, "while": True, "loop": True, "repeat": True}
 CLOSING: Final = frozenset({"endif", "endswitch", "endfor", "endwhile", "endloop", "until"})
 OTHERWISE: Final = frozenset({"else", "case", "default"})
 JUMPS: Final = frozenset({"goto", "return"})
-SPLINES: Final = frozenset({"spline", "ptp_spline"})
 TAUGHT_ACCURATE: Final = "bit 3 of S says that points were taught with an absolutely accurate robot"
 RUN_TIME: Final = "its target is computed at run time"
 READ: Final = "the program computes with it"
@@ -252,7 +241,7 @@ class KrlReading:
         elif word in SPLINES:
             self._in_spline, self._around = True, flow.state
             flow.state = self._with(reader.rest())
-        elif word == "endspline":
+        elif word == SPLINE_ENDS:
             self._in_spline, flow.state = False, self._around
             self._after_interrupts()
         if word != "decl":

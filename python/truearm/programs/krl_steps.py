@@ -6,6 +6,7 @@ from typing import Final
 
 from truearm.programs.krl_storage import HEADER, lines
 from truearm.programs.krl_values import line_reader, operands
+from truearm.programs.krl_words import LINE_BLENDING, MOTIONS, SPLINE_ENDS, SPLINES
 from truearm.programs.layouts import DECIMALS_DEG, DECIMALS_MM, of_pose
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
@@ -13,10 +14,7 @@ from truearm.programs.stepping import lines_before, target_of
 
 PASSED: Final = {"lin": "C_DIS", "slin": "C_SPL"}
 """How the arm passes a waypoint, by the word of the motion."""
-BLENDING: Final = frozenset({"c_dis", "c_ori", "c_vel", "c_spl"})
-MOTIONS: Final = frozenset({"lin", "slin", "ptp", "sptp", "circ", "scirc"})
 WORD: Final = re.compile(r"[\w$]+")
-SPLINES: Final = {"spline": True, "ptp_spline": True, "endspline": False}
 AHEAD: Final = frozenset({"trigger", "stop", "const_vel", "time_block", "interrupt", "global"})
 """The first word of a statement that belongs to the motion behind it; "global" as of an interrupt."""
 
@@ -64,14 +62,14 @@ def _plain(source: Source, wanted: set[int]) -> set[int]:
         begins = WORD.match(text)
         word = "" if begins is None else begins.group()
         if text.startswith(";fold"):
-            folds.append(not MOTIONS.isdisjoint(WORD.findall(text)))
+            folds.append(not MOTIONS.keys().isdisjoint(WORD.findall(text)))
         elif text.startswith(";endfold"):
             del folds[-1:]
         elif HEADER.match(text):
             folds.clear()
             in_spline = belongs = False
-        elif word in SPLINES:
-            in_spline, belongs = SPLINES[word], False
+        elif word in SPLINES or word == SPLINE_ENDS:
+            in_spline, belongs = word in SPLINES, False
         elif word in AHEAD:
             belongs = True
         elif word in MOTIONS:
@@ -86,4 +84,4 @@ def _alone(source: Source, start: int, end: int) -> bool:
     reader = line_reader(source, start, end)
     if reader.take().text.lower() not in PASSED or operands(reader) is None:
         return False
-    return all(token.text.lower() in BLENDING for token in reader.rest())
+    return all(token.text.lower() in LINE_BLENDING for token in reader.rest())

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from truearm.calibration import Calibration
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.errors import Notice, list_names, typed
 from truearm.fits.stillness import carried_joints, moved_joints, still_words
 from truearm.inputs import PAYLOAD_KG, is_payload
@@ -106,7 +106,7 @@ def update_notices(calibration: Calibration) -> list[Notice]:
     revision = calibration.revision
     if revision is None or revision.report["verdict"] != "field":
         return []
-    if any(notice.kind in AT_ONCE for notice in calibration.notices):
+    if any(notice.kind in STEP_KINDS for notice in calibration.notices):
         text = f"What the update that this calibration is of was measured with changed meanwhile. {MEANWHILE}"
         return [Notice("update", text)]
     text = (

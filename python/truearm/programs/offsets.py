@@ -20,13 +20,12 @@ from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-MRAD_PER_RAD: Final = 1e3
 ALSO_OFFSET: Final = (
     "it is used as it stands and with offsets, and one change cannot suit them all exactly; --offsets-mm "
     "allows some deviation"

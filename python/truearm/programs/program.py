@@ -24,6 +24,8 @@ Integers = NDArray[np.int64]
 class Listed:
     """A target or a motion that is left as it is.
 
+    `truearm.compensate_program` makes one, in `rewritten.listed` and `rewritten.kept`.
+
     Attributes:
         file: Number of its file.
         line: Line, from 1.

@@ -97,7 +97,7 @@ class Choices:
             for its use as it stands; None changes no target that is used with offsets as well.
 
     Raises:
-        UsageError: If `on_refusal` is another word, the spacing none, or the length no positive number.
+        UsageError: If `on_refusal` is another word, `spacing` is no Spacing, or the length is not above 0.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"

@@ -69,7 +69,7 @@ def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions 
     flat = columns.reshape(len(unchanged), -1)
     evenly = candidates.points[fill(candidates.points, count)]
     apart = APART * least_distance(evenly) if count > 1 else 0.0
-    core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": apart}
+    core = candidates.core(apart)
     rows, values = choose_telling(unchanged + flat @ flat.T, unchanged, core, count)
     picked = np.array(rows, dtype=np.int64)
     told = _told(candidates, unchanged, columns, picked)

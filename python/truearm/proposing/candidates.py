@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from truearm.fits.enough_values import setup_unknowns
 from truearm.kinds import required
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import usual_sigma_m
+
+if TYPE_CHECKING:
+    from truearm import _core
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -81,6 +85,10 @@ class Candidates:
         found = self.calibration.spread.noise(self.jacobian, self.orientation)
         own = usual_sigma_m(self.calibration) ** 2 * np.diag(~self.orientation)
         return np.ascontiguousarray(found + own)
+
+    def core(self, apart: float = 0.0) -> "_core.Candidates":
+        """Internal: the candidates as the core chooses from them, at a distance from one another, m."""
+        return {"noise": self.noise, "points": np.ascontiguousarray(self.points), "apart": apart}
 
     @property
     def set_up(self) -> str:

@@ -51,9 +51,8 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
             stripped, or of a scheme.
     """
     check_count(candidates, count)
-    core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": 0.0}
     where = replace(candidates, readings=workspace)
-    rows, variance = choose_informative(candidates.covariance(where), core, count)
+    rows, variance = choose_informative(candidates.covariance(where), candidates.core(), count)
     expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.description.one_turn import one_turn
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.grids import grid_steps, grid_words
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
@@ -231,7 +231,7 @@ class Facts:
     @property
     def changed_meanwhile(self) -> bool:
         """Whether something stood otherwise from some measured row on."""
-        return any(map(self.noticed, AT_ONCE))
+        return any(map(self.noticed, STEP_KINDS))
 
     @cached_property
     def still(self) -> str:

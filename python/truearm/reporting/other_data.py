@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.of_results import OF_NO_USE
 from truearm.evaluation import Evaluation
 from truearm.judgement.validation import HEADINGS, STATISTICS
@@ -17,7 +17,7 @@ from truearm.reporting.parts import Part, Section, Table
 from truearm.solving import FEATURE_RANGE
 from truearm.units import MM_PER_METRE
 
-WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED, *AT_ONCE)
+WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED, *STEP_KINDS)
 
 
 def not_met(facts: Facts) -> list[Advice]:
@@ -39,7 +39,7 @@ def _no_help(found: Evaluation) -> str:
     kinds = {notice.kind for notice in found.notices}
     if kinds & set(OF_NO_USE):
         return " On these measurements the calibration does not help."
-    if kinds & set(AT_ONCE):
+    if kinds & set(STEP_KINDS):
         return " What was measured changed meanwhile."
     return (
         " The arm, its tool or the set-up is not as it was calibrated." if NOT_AS_CALIBRATED in kinds else ""
@@ -59,13 +59,13 @@ def other_data(facts: Facts) -> Section:
     apart = facts.outliers.without
     verb = "was" if len(found.finds) == 1 else "were"
     how = (
-        f"{' and '.join(found.finds).capitalize()} {verb} found from others, {found.rows_of_frame}"
+        f"{' and '.join(found.finds).capitalize()} {verb} found from others, {found.frame_in_words}"
         if found.n_frame and found.finds
         else "Frame and tool were kept"
     )
     no_help = _no_help(found)
     table = Table(
-        f"{', '.join(facts.other_names)}: {found.rows_judged} judged, mm",
+        f"{', '.join(facts.other_names)}: {found.judged_in_words} judged, mm",
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from truearm.errors import count_of, short_names
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.outlier_fate import fate_of_outliers, taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed
@@ -61,7 +61,7 @@ def _now() -> str:
 def _options(facts: Facts) -> Table:
     """The options that bear on the model, those that are not the defaults first."""
     options = facts.calibration.options
-    used, usual = options.to_dict(), Options().to_dict()
+    used, usual = options.to_dict(), CalibrationOptions().to_dict()
     words = shown_options(options.model)
     changed = [name for name in words if used[name] != usual[name]]
     names = [*changed, *(name for name in words if name not in changed)]
@@ -69,7 +69,7 @@ def _options(facts: Facts) -> Table:
         "Options that differ from the defaults come first, in bold." if changed else "All are the defaults."
     )
     return Table(
-        "Options",
+        "CalibrationOptions",
         ["option", "value"],
         [[words[name], _value(facts, name, used[name])] for name in names],
         says=says,

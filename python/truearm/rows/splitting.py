@@ -50,7 +50,7 @@ class HoldoutRange:
         """The range that "q2:high:0.3" stands for.
 
         Raises:
-            UsageError: If it stands for none.
+            UsageError: If it does not name a range.
         """
         found = RANGE_FORM.fullmatch(text)
         share = _number(found[3]) if found else None

@@ -22,7 +22,6 @@ from truearm.units import to_si
 Floats = NDArray[np.float64]
 
 LENGTHS: Final = ("d", "a")
-OPEN_REACH_M: Final = 0.5
 
 
 def default_parameters(robot: Robot) -> list[str]:
@@ -85,7 +84,7 @@ def amount_si(name: str, amount: float) -> float:
 
 def joint_ranges(robot: Robot) -> tuple[Floats, Floats]:
     """Lowest and highest readings (N,); half a turn or half a metre where there is no limit."""
-    return robot.finite_limits(OPEN_REACH_M)
+    return robot.finite_limits()
 
 
 def direction(rng: np.random.Generator) -> Floats:

@@ -23,7 +23,7 @@ from truearm.fits.identified import IdentifiedArm
 from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.validation import Validation
@@ -169,16 +169,16 @@ def _read_measured(
     return MeasuredParts.of(rows.data, selection, groups)
 
 
-def _read_options(content: Mapping[str, Any]) -> Options:
+def _read_options(content: Mapping[str, Any]) -> CalibrationOptions:
     """The options of a file; numbers of another kind than is asked for today are taken where they are equal.
 
     Raises:
         InputError: If there is no such option, or a value breaks a rule.
     """
-    usual = Options().to_dict()
+    usual = CalibrationOptions().to_dict()
     given = {name: _as_asked_for(value, usual.get(name)) for name, value in content.items()}
     try:
-        return Options.of(**{**LEFT_OUT, **given})
+        return CalibrationOptions.of(**{**LEFT_OUT, **given})
     except UsageError as error:
         raise InputError(error.what, where=error.where, rule=error.rule, way_out=AGAIN) from error
 

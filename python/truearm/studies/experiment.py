@@ -21,6 +21,7 @@ from truearm.studies.setting import (
     CANDIDATES,
     CELLS,
     DEMANDED_M,
+    FREE_TO_STOP,
     MAIN_READING,
     MEMBERSHIPS,
     NOISE_MM,
@@ -35,7 +36,6 @@ from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-FREE_TO_STOP: Final = 1024
 WORKSPACE_SEED: Final = 7
 
 

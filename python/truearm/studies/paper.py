@@ -245,8 +245,8 @@ def cmac(seed: Seed) -> Result:
     result = _judged(made, schemes, readings)
     sensitivity: Result = {}
     for number, (name, change) in enumerate(SENSITIVITY.items(), start=1):
-        network = {key: change.get(key, value) for key, value in NETWORK.items()}
-        training = {key: change.get(key, value) for key, value in TRAINING.items()}
+        network: Any = {key: change.get(key, value) for key, value in NETWORK.items()}
+        training: Any = {key: change.get(key, value) for key, value in TRAINING.items()}
         with seed.stages(f"network {number} of {len(SENSITIVITY)}"):
             scheme = trained_network(made, constant, ceps, network, training)
         sensitivity |= {name: {**_judged(made, {name: scheme}, readings)[name], "training": scheme.notes}}

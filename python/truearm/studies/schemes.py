@@ -1,8 +1,8 @@
 """The schemes that are compared: each says what the parameters are at a pose."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
@@ -12,26 +12,29 @@ from truearm._core import Network, Regions, Training, fill_without_data, lineari
 from truearm.fits.core_set import Selection
 from truearm.fits.fitting import Hyper, KnownHyper, Task, fit_rows
 from truearm.fits.models import VARIABLE
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.schemes import add_ceps, training_pairs
 from truearm.measurements import Measurements
 from truearm.studies.experiment import Experiment
 from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm._core import NetworkFitOptions, NetworkOptions, RegionalOptions, TrainingRule
 
 Floats = NDArray[np.float64]
 Parameters = Callable[[Floats], Floats]
 
 CONSTANT_STEPS: Final = 3
 SIGMA_CELLS: Final = 0.5
-NETWORK: Final[Mapping[str, Any]] = {
+NETWORK: Final["NetworkOptions"] = {
     "membership": "gaussian",
     "sigma": SIGMA_CELLS,
     "composition": "min",
     "table": None,
 }
-SPLINES: Final = {**NETWORK, "membership": "bspline", "composition": "product"}
-QUANTISED: Final = {**NETWORK, "membership": "quantised"}
-TRAINING: Final[Mapping[str, Any]] = {
+SPLINES: Final["NetworkOptions"] = {**NETWORK, "membership": "bspline", "composition": "product"}
+QUANTISED: Final["NetworkOptions"] = {**NETWORK, "membership": "quantised"}
+TRAINING: Final["TrainingRule"] = {
     "rate": 0.5,
     "normalise": "printed",
     "tolerance": 1e-6,
@@ -95,7 +98,7 @@ def measured_schemes(made: Experiment, kept: Kept) -> dict[str, Scheme]:
 
 def variable_scheme(made: Experiment, kept: Kept) -> Scheme:
     """Our variable model with the base as a row, as `truearm calibrate --frame world` fits it."""
-    task = Task(made.identified, Selection((0,)), ("measured",), Options(frame="world"))
+    task = Task(made.identified, Selection((0,)), ("measured",), CalibrationOptions(frame="world"))
     columns = {f"q{j + 1}": made.readings[:, j] for j in range(made.readings.shape[1])}
     columns |= dict(zip("xyz", made.points.T, strict=True))
     data = Measurements.from_dataframe(pd.DataFrame(columns | {"group": "measured"}))
@@ -114,7 +117,7 @@ def variable_scheme(made: Experiment, kept: Kept) -> Scheme:
 def constant_parameters(made: Experiment) -> Floats:
     """Conventional calibration, section 3.1: one region, least squares, parameters (L, 5)."""
     whole, parameters = Regions(made.space.low, made.space.high), made.identified.table.copy()
-    options = {"method": "least_squares", "prior": None}
+    options: RegionalOptions = {"method": "least_squares", "prior": None}
     for _ in range(CONSTANT_STEPS):
         fit = regional_ceps(whole, made.problem, parameters, made.setup, made.features, options)
         parameters = add_ceps(parameters, made.columns, fit.ceps[:1])[0]
@@ -123,7 +126,7 @@ def constant_parameters(made: Experiment) -> Floats:
 
 def region_ceps(made: Experiment, constant: Floats, method: str) -> Floats:
     """CEPs (nodes, P) beside the conventional ones; regions without data have their neighbours' mean."""
-    options = {"method": method, "prior": None}
+    options: RegionalOptions = {"method": method, "prior": None}
     fit = regional_ceps(made.regions, made.problem, constant, made.setup, made.features, options)
     return np.asarray(fit.ceps)
 
@@ -132,12 +135,12 @@ def trained_network(
     made: Experiment,
     constant: Floats,
     ceps: Floats,
-    network: Mapping[str, Any] = NETWORK,
-    training: Mapping[str, Any] = TRAINING,
+    network: "NetworkOptions" = NETWORK,
+    training: "TrainingRule" = TRAINING,
 ) -> Scheme:
     """A network trained by (A5) on regional CEPs, several points of each region; it starts at their mean."""
     inputs, wanted = training_pairs(made.regions, ceps)
-    empty = Network(made.sensors, len(made.columns), dict(network))
+    empty = Network(made.sensors, len(made.columns), network)
     trained: Training = empty.train(inputs, wanted, {**training, "columns": made.columns})
     notes = {
         "epochs": float(trained.epochs),
@@ -150,12 +153,12 @@ def trained_network(
 def _fitted_network(
     made: Experiment,
     constant: Floats,
-    network: Mapping[str, Any],
+    network: "NetworkOptions",
     scales: tuple[float, float, float] | None,
 ) -> tuple[Scheme, tuple[float, float, float]]:
     jacobian, residual = linearise(made.problem, constant, made.setup)
-    empty = Network(made.sensors, len(made.columns), dict(network))
-    how = {"columns": made.columns, "scales": scales, "threads": None}
+    empty = Network(made.sensors, len(made.columns), network)
+    how: NetworkFitOptions = {"columns": made.columns, "scales": scales, "threads": None}
     fitted = empty.fit(made.features, jacobian, residual, how)
     return _network(made, constant, fitted.network, {}), fitted.scales
 

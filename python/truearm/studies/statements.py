@@ -77,7 +77,7 @@ def _observable(_: Result) -> tuple[str, bool]:
 def _network(_: Result) -> tuple[str, bool]:
     space = space_of("joint")
     ends = zip(space.low.tolist(), space.high.tolist(), CELLS["joint"], strict=True)
-    made = Network([(low, high, n, MEMBERSHIPS) for low, high, n in ends], 15, dict(NETWORK))
+    made = Network([(low, high, n, MEMBERSHIPS) for low, high, n in ends], 15, NETWORK)
     numbers = (made.sensor_cells, made.cell_count, made.active_count)
     words = f"{numbers[0]} = 17 + 11 + 11, {numbers[1]} = 17 x 11 x 11, {numbers[2]} active"
     return words, numbers == (39, 2057, 27)

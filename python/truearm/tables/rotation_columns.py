@@ -70,8 +70,8 @@ class RotationColumns:
         """Quaternions (n, 4), w first, of the columns' values (n, 3), (n, 4) or (n, 9); NaN rows stay NaN.
 
         Raises:
-            InputError: If a row has some of the values and not all, what should be a rotation matrix is none,
-                or an angle is longer than a turn.
+            InputError: If a row has some of the values and not all, what should be a rotation matrix does not
+                turn, or an angle is longer than a turn.
         """
         given = np.isfinite(values).all(axis=1)
         partial = np.isfinite(values).any(axis=1) & ~given

@@ -9,7 +9,7 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.doubts.admitted import admitted
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.of_results import LARGE_MM
 from truearm.doubts.slips import Slip
 from truearm.doubts.turning_sense import check_turns
@@ -147,7 +147,7 @@ class Update:
     @property
     def changed_meanwhile(self) -> bool:
         """Whether something stood otherwise from some row on: the arm is then not told as changed by it."""
-        return any(notice.kind in AT_ONCE for notice in self.notices)
+        return any(notice.kind in STEP_KINDS for notice in self.notices)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration."""

@@ -48,6 +48,8 @@ class Judge:
 class Offset:
     """The change of a joint's offset: what is added to its reading.
 
+    `truearm.update` makes one of each joint, `update.offsets`.
+
     Attributes:
         joint: From 1.
         unit: "deg" or "mm".
@@ -78,6 +80,8 @@ class Offset:
 @dataclass(frozen=True)
 class Motion:
     """How far a frame, a tool, or the base of a known world moved.
+
+    `truearm.update` makes one of each set-up, in `update.frames` and `update.tools`.
 
     Attributes:
         part: "frame", "base" or "tool".

@@ -23,6 +23,8 @@ NEGLIGIBLE: Final = 1e-2
 class SquaresTest:
     """A sum of squares in units of a scale that the calibration's own rows told, hence F distributed.
 
+    `truearm.update` makes one of what may have moved, `update.changed`, and of what is left, `update.rest`.
+
     Attributes:
         squares: The sum.
         freedom: Degrees of freedom.
@@ -35,7 +37,7 @@ class SquaresTest:
 
     @classmethod
     def of(cls, values: Floats, freedom: int, known: int) -> "SquaresTest":
-        """That of standardised values (k,), whose scale is known from `known` degrees of freedom."""
+        """Internal: that of standardised values (k,), whose scale `known` degrees of freedom tell."""
         squares = float(np.square(values).sum())
         return cls(squares, freedom, float(fdtrc(freedom, known, squares / freedom)) if freedom else 1.0)
 

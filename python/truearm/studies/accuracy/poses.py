@@ -11,7 +11,7 @@ from truearm.fits.core_set import Selection, core_set
 from truearm.fits.fitting import Fits, Task, fit_rows
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.models import CONSTANT, ArmModel
-from truearm.fits.options import Options
+from truearm.fits.options import CalibrationOptions
 from truearm.fits.parameters import KIND_COUNT, D
 from truearm.judgement.judging import model_inputs, setup_of_judged
 from truearm.measurements import Measurements
@@ -151,7 +151,7 @@ def prepare(cell: Cell) -> Prepared:
     read = read_set(cell.data_set)
     split = rows_of(cell.data_set, cell.cut, cell.seed, cell.poses)
     train, held = read.data.select(split.train), read.data.select(split.holdout)
-    options = Options(model="constant", use="position")
+    options = CalibrationOptions(model="constant", use="position")
     arm = IdentifiedArm(read.robot, options.frame, options.parallel_within_deg)
     task = Task(arm, Selection((0,)), train.groups, options, THREADS)
     return Prepared(cell, task, train, held, fit_rows(task, train))

@@ -17,13 +17,12 @@ from truearm.planning.dividing import DividedSpace, DivisionOptions, divide_spac
 from truearm.planning.workspace import Workspace
 from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.process.setting import DEMANDED_MM, Setting, cell_text, space
-from truearm.studies.setting import CANDIDATES
+from truearm.studies.setting import CANDIDATES, FREE_TO_STOP
 from truearm.tables.columns import VALIDATE
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-FREE_TO_STOP: Final = 1024
 PLANNED: Final = 0
 """Seed of the draw of poses: the same for all arms."""
 TRAIN: Final = "train"
