@@ -93,6 +93,34 @@ def test_frame_and_target_are_determined_along_with_a_free_arm():
     assert np.isfinite(choose(arm, readings, 30, offset).after["kappa"])
 
 
+def test_the_turn_of_the_target_is_determined_where_orientation_is_measured():
+    robot = Robot.load("ur10")
+    arm, readings, pose = IdentifiedArm(robot), VirtualArm(robot).poses(40), ChoiceOptions(pose=True)
+    jacobian, columns = unknowns_jacobian(arm, readings, pose)
+    assert jacobian.shape == (40, 6, len(columns)) == (40, 6, 12 + len(arm.candidates.columns))
+    # A target that turns by itself moves no point, and turns what is measured about the same axis.
+    np.testing.assert_allclose(jacobian[:, :3, 9:12], 0.0, atol=1e-12)
+    turns = np.linalg.norm(jacobian[:, 3:, 9:12], axis=1)
+    np.testing.assert_allclose(turns, 1.0)
+    # Offset and turn of the last joint and of the target on it are one.
+    assert {"theta6", "d6"}.isdisjoint(_determined(arm, independent_columns(jacobian, columns)))
+
+
+def _determined(arm, kept):
+    return {arm.candidates.names[k - 12] for k in kept if k >= 12}
+
+
+def test_named_parameters_that_the_pool_does_not_determine_are_refused(pool):
+    robot = Robot.load("ur10")
+    arm, readings = IdentifiedArm(robot), VirtualArm(robot).poses(40)
+    with pytest.raises(WorkError, match='names: .*do not determine "theta1" and "d1".*Name others'):
+        choose(arm, readings, 12, ChoiceOptions(names=("d1", "theta2", "theta1")))
+    still, named = np.tile(pool[:1], (20, 1)), ChoiceOptions(names=PAPER_PARAMETERS)
+    with pytest.raises(WorkError, match="do not determine"):
+        choose(WORLD, still, 6, named)
+    assert np.isfinite(choose(WORLD, still, 6, named, given=pool[1:15]).after["kappa"])
+
+
 def test_parameters_and_criteria_that_are_none_are_refused(pool):
     with pytest.raises(UsageError, match=r'no parameter "theta9".*Did you mean "theta'):
         choose(WORLD, pool, 20, ChoiceOptions(names=["theta1", "theta9"]))

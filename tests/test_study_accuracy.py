@@ -1,6 +1,7 @@
 """`truearm study accuracy`, as a user runs it: results, going on, splits, and what is refused."""
 
 import json
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from truearm.simulation import VirtualArm
 from truearm.studies.accuracy import judging, libraries, running
 from truearm.studies.accuracy.cells import Asked, list_cells, parse_sizes, study_seeds
 from truearm.studies.accuracy.page import page
-from truearm.studies.accuracy.results import Kept
+from truearm.studies.accuracy.results import MARK, Kept, key_of
 from truearm.studies.accuracy.sets import parse_sets, read_set
 from truearm.studies.accuracy.splits import KINDS, Cut, cuts, divide
 from truearm.workers import Done
@@ -86,6 +87,68 @@ def test_an_interrupted_study_goes_on(file, tmp_path, here, capsys):
     assert {_but_times(one) for one in again} == {_but_times(json.loads(line)) for line in lines}
     assert study(file, out, *FAST, "--splits", "random", "--again", "grid") == 0
     assert here[-4:] == ["grid"] * 4
+
+
+def _kept(out):
+    """Lines of the results, by what they are known by."""
+    lines = (out / "results.jsonl").read_text().splitlines()
+    found = {key_of(json.loads(line)): line for line in lines}
+    assert len(found) == len(lines)
+    return found
+
+
+def test_only_what_is_asked_is_found_anew(file, tmp_path, here):
+    out = tmp_path / "out"
+    assert study(file, out, *FAST, "--splits", "random") == 0
+    before = _kept(out)
+    asked = ["--methods", "constant,grid", "--sizes", "20", "--seeds", "1", "--quick", "--splits", "random"]
+    del here[:]
+    assert study(file, out, *asked, "--again", "grid") == 0
+    assert here == ["grid"]
+    after = _kept(out)
+    assert after.keys() == before.keys()
+    assert sum(after[key] != before[key] for key in before) == 1
+
+
+def test_a_run_that_finds_results_anew_goes_on(file, tmp_path, here, monkeypatch, capsys):
+    out, given = tmp_path / "out", [*FAST, "--splits", "random"]
+    assert study(file, out, *given, "--methods", "constant") == 0
+    anew = [*given, "--methods", "constant,grid", "--again", "constant,grid"]
+    run_tasks = running.run_tasks
+    monkeypatch.setattr(running, "run_tasks", lambda *args, **_: _until(run_tasks(*args), 5))
+    assert study(file, out, *anew) == 130
+    assert "the same command goes on with the others" in _words(capsys.readouterr().err)
+    assert len(here) == 4 + 5
+    monkeypatch.setattr(running, "run_tasks", run_tasks)
+    assert study(file, out, *anew) == 0
+    assert len(here) == 4 + 8
+    results = json.loads((out / "accuracy.json").read_text())["results"]
+    assert not any(MARK in result for result in results)
+    assert study(file, out, *anew) == 0
+    assert len(here) == 4 + 8 + 8
+    assert len(_kept(out)) == 8
+
+
+def _until(done, count):
+    """So many of what is done, then an interruption."""
+    yield from islice(done, count)
+    raise KeyboardInterrupt
+
+
+def test_earlier_results_stay_until_those_found_anew_are_there(file, tmp_path, here, monkeypatch, capsys):
+    out, given = tmp_path / "out", [*FAST, "--splits", "random"]
+    assert study(file, out, *given) == 0
+    before = _kept(out)
+    broken = [Done(index, error=RuntimeError("broken")) for index in range(4)]
+    with monkeypatch.context() as patch:
+        patch.setattr(running, "run_tasks", lambda *_, **__: (done for done in broken))
+        assert study(file, out, *given, "--again", "grid") == 1
+        told = capsys.readouterr()
+        assert "8 of 12 results are there" in told.out
+        assert "4 results are missing, the first of grid" in _words(told.err)
+    assert _kept(out) == before
+    assert study(file, out, *given, "--so-far") == 0
+    assert "12 of 12 results are there" in capsys.readouterr().out
 
 
 def test_what_an_interruption_leaves_is_told(file, tmp_path, monkeypatch, capsys):
@@ -224,6 +287,8 @@ def test_the_same_job_gives_the_same_result(file):
         (["--sizes", "10,many"], '"many" is no number of poses'),
         (["--sizes", "10,10"], "Each size once"),
         (["--again", "nothing"], 'no method "nothing"'),
+        (["--methods", "grid,knn", "--again", "grid,ours"], '--again: "ours": not compared here'),
+        (["--again", "grid", "--so-far"], "--so-far runs nothing"),
     ],
 )
 def test_wrong_usage_is_refused_before_any_work(file, tmp_path, given, message, here, capsys):

@@ -1,6 +1,7 @@
 """`truearm study accuracy`: which rows train, which are judged, and which cannot be asked for."""
 
 import json
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -19,7 +20,7 @@ from truearm.studies.accuracy.poses import Poses, prepare
 from truearm.studies.accuracy.results import Kept
 from truearm.studies.accuracy.running import Study
 from truearm.studies.accuracy.sets import parse_sets, read_set
-from truearm.studies.accuracy.splits import FEWEST_JUDGED, KINDS, cuts, divide
+from truearm.studies.accuracy.splits import FEWEST_JUDGED, KINDS, Kind, cuts, divide
 from truearm.workers import Done
 
 POSES = 60
@@ -188,6 +189,17 @@ def test_methods_are_compared_over_the_runs_that_both_have():
     assert "| regional CEPs | 0.100 (1 of 3) |" in text
     assert "| constant D-H | 1.000 |" in text
     assert "| variable D-H (ours) | **0.500** |" in text
+
+
+def test_splits_that_are_named_and_not_possible_are_told(table, read_as):
+    one = read_as(table.assign(place=np.arange(POSES)))
+    stated: tuple[Kind, ...] = ("groups", "target")
+    asked = Asked((*stated, "random"), ("place",), ("20",), (7,))
+    assert check_askable([one], asked) == []
+    assert [str(notice) for notice in check_askable([one], replace(asked, stated=stated))] == [
+        'Left out of arm: whole groups held out, because few of its rows are equal to others in "place".',
+        "Left out of arm: judged at another target, because one target was measured.",
+    ]
 
 
 def _study(file, out, *more):

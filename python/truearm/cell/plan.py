@@ -24,11 +24,11 @@ from truearm.kinds import check_values, settle
 from truearm.planning.accessibility import Rule
 from truearm.planning.choosing import (
     CRITERIA,
-    SETUP_KINDS,
     Choice,
     ChoiceOptions,
     Criterion,
     choose,
+    setup_kinds,
     unknowns_jacobian,
 )
 from truearm.planning.spreading import fill
@@ -210,7 +210,7 @@ def expected_mm(
     """
     chosen = choose(arm, pool, count, wanted).rows
     jacobian, _ = unknowns_jacobian(arm, pool, wanted)
-    links = jacobian.shape[2] - (0 if arm.world_is_known else len(SETUP_KINDS))
+    links = jacobian.shape[2] - len(setup_kinds(arm, pose=wanted.pose))
     prior = np.concatenate([np.full(jacobian.shape[2] - links, FREE), np.full(links, PRIOR_M)])
     scaled = jacobian * prior
     rows = scaled[chosen].reshape(-1, scaled.shape[2]) / (1e-3 * sigma_mm)

@@ -11,7 +11,7 @@ from truearm.cli.arguments import AngleUnit, AsJson, LengthUnit, OutputDirectory
 from truearm.cli.console import print_json, print_table, say, suggest, tell, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress
-from truearm.errors import InputError, UsageError, WorkError
+from truearm.errors import InputError, UsageError, WorkError, list_names
 from truearm.files import make_directory, write_whole
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def command(
         str | None,
         typer.Option(
             metavar="NAME,NAME",
-            help="Methods whose results are forgotten and found anew, as after a change of version.",
+            help="Methods whose results are found anew, as after a change of version.",
         ),
     ] = None,
     scheduler: Scheduler = None,
@@ -77,7 +77,8 @@ def command(
 
     Writes DIR/accuracy.json, DIR/accuracy.md and learning curves as PNG and SVG. Every result is kept in
     DIR/results.jsonl as soon as it is there, with the version that found it; the same command goes on where
-    it was interrupted, and keeps results of earlier versions. The workers of a scheduler read the files
+    it was interrupted, and keeps results of earlier versions. Those of --again stay until what is found anew
+    takes their place. The workers of a scheduler read the files
     themselves, so they must see them under the same names.
 
     Examples:
@@ -92,7 +93,7 @@ def command(
 
     asked = {"methods": methods, "splits": splits, "split_by": split_by, "sizes": sizes, "seeds": seeds}
     study = _study(data, robot, (length_unit, angle_unit), asked, quick=quick)
-    where = Where(scheduler, workers, _again(again))
+    where = Where(scheduler, workers, _again(again, study, so_far=so_far))
     check_directory(output)
     with ends_promptly(lambda: _left_behind(output)):
         _warn_of(study)
@@ -147,10 +148,12 @@ def _study(
     from truearm.studies.accuracy.splits import check_kinds
 
     split_by = _words(asked["split_by"])
-    kinds = check_kinds(_words(asked["splits"]), split_by=bool(split_by))
+    named = _words(asked["splits"])
+    kinds = check_kinds(named, split_by=bool(split_by))
+    stated = tuple(kind for kind in kinds if kind in named or kind == "groups")
     return Study(
         parse_sets(data, robot, *units),
-        Asked(kinds, split_by, parse_sizes(asked["sizes"]), study_seeds(asked["seeds"])),
+        Asked(kinds, split_by, parse_sizes(asked["sizes"]), study_seeds(asked["seeds"]), stated),
         check_methods(_words(asked["methods"])),
         quick,
     )
@@ -165,10 +168,26 @@ def _left_behind(output: Path) -> str:
     return f"Results so far are in {output}; the same command goes on with the others."
 
 
-def _again(given: str | None) -> tuple[str, ...]:
+def _again(given: str | None, study: "Study", *, so_far: bool) -> tuple[str, ...]:
+    """Methods whose results are found anew, all of which the study compares."""
     from truearm.studies.accuracy.methods import check_methods
 
-    return check_methods(_words(given)) if given else ()
+    names = check_methods(_words(given)) if given else ()
+    others = [name for name in names if name not in study.methods]
+    if others:
+        raise UsageError(
+            f"{list_names(others)}: not compared here",
+            where="--again",
+            rule=f"--methods names {list_names(study.methods)}",
+            way_out="Name the same methods in both",
+        )
+    if names and so_far:
+        raise UsageError(
+            "--again with --so-far",
+            rule="--so-far runs nothing, so that nothing is found anew",
+            way_out="Leave one of them out",
+        )
+    return names
 
 
 def _words(given: str | None) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm import kinds
 from truearm._core import CoreError, Problem, choose_poses, independent_columns, linearise, setup_jacobian
-from truearm.errors import UsageError, WorkError
+from truearm.errors import UsageError, WorkError, list_names
 from truearm.fits.core_set import known_setup, measured_points
 from truearm.fits.endpoints import at_tool
 from truearm.fits.identified import IdentifiedArm
@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]
 
 CRITERIA: Final = ("kappa", "d", "o1", "o2", "o3", "o4", "o5")
-SETUP_KINDS: Final = (D, D, D, THETA, THETA, THETA, D, D, D)
-"""Kinds of the unknowns of the set-up: shift and turn of the base, shift of the target."""
+SHIFT: Final = (D, D, D)
+TURN: Final = (THETA, THETA, THETA)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,9 @@ def choose(
     """Choose `count` of the poses `readings` (n, N).
 
     With the arm's frame "world" the parameters are the base row's and the links'; else the unknowns of the
-    set-up, world_from_base and the target, are determined along with them.
+    set-up, world_from_base and the target (its turn too where orientation is measured), are determined along
+    with them. Parameters that the pool and the given poses do not determine are left out, unless the options
+    name them.
 
     Args:
         arm: The arm and what of it is unknown.
@@ -102,7 +104,8 @@ def choose(
 
     Raises:
         UsageError: If there is no such parameter, or `count` is no whole number.
-        WorkError: If the pool is smaller than the choice, or the choice too small to determine the unknowns.
+        WorkError: If the pool is smaller than the choice, the choice too small to determine the unknowns, or
+            a parameter that is named is not determined.
     """
     kinds.required(arm, IdentifiedArm, "the arm")
     kinds.check_number(count, "count", Integral)
@@ -114,16 +117,16 @@ def choose(
             way_out="Draw a larger pool, or choose fewer",
         )
     jacobian, columns = unknowns_jacobian(arm, readings, chosen)
-    kept = independent_columns(jacobian, columns)
-    _check_enough(count + (0 if given is None else len(given)), jacobian.shape[1], len(kept))
-    measured = None
-    if given is not None and len(given):
-        measured = unknowns_jacobian(arm, given, chosen)[0][:, :, kept]
+    before = jacobian[:0] if given is None or not len(given) else unknowns_jacobian(arm, given, chosen)[0]
+    kept = independent_columns(np.concatenate([before, jacobian]), columns)
+    if chosen.names is not None:
+        _check_determined(arm, columns, kept, setup=len(setup_kinds(arm, pose=chosen.pose)))
+    _check_enough(count + len(before), jacobian.shape[1], len(kept))
     how: _core.ChoiceOptions = {
         "columns": [columns[k] for k in kept],
         "criterion": chosen.criterion,
         "limit": chosen.limit,
-        "given": None if measured is None else np.ascontiguousarray(measured),
+        "given": np.ascontiguousarray(before[:, :, kept]) if len(before) else None,
         "start": None,
         "passes": chosen.passes,
     }
@@ -151,6 +154,19 @@ def check_some(names: Sequence[str], option: str) -> None:
         raise UsageError(f"{list(names)}", where=option, rule="One parameter or more, each once")
 
 
+def _check_determined(arm: IdentifiedArm, columns: list[int], kept: Sequence[int], *, setup: int) -> None:
+    """Raise WorkError where parameters, which stand behind the set-up, are not among the columns kept."""
+    name_of = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
+    lost = [name_of[columns[k]] for k in sorted(set(range(setup, len(columns))) - set(kept))]
+    if lost:
+        raise WorkError(
+            f"the poses of the pool do not determine {list_names(lost)}",
+            where="names",
+            rule="The set-up, or parameters before them, can stand for them at every pose",
+            way_out="Name others, or draw a pool in which more joints move",
+        )
+
+
 def _check_enough(count: int, values: int, unknowns: int) -> None:
     """Raise WorkError where so many poses, each of so many values, cannot determine the unknowns."""
     if count * values < unknowns:
@@ -159,6 +175,14 @@ def _check_enough(count: int, values: int, unknowns: int) -> None:
             rule=f"{unknowns} unknowns of arm and set-up are to be determined",
             way_out=f"Choose {-(-unknowns // values)} poses or more",
         )
+
+
+def setup_kinds(arm: IdentifiedArm, *, pose: bool) -> tuple[int, ...]:
+    """Kinds of the unknowns of the set-up, none where the world is known.
+
+    They are shift and turn of the base and shift of the target, and its turn where orientation is measured.
+    """
+    return () if arm.world_is_known else SHIFT + TURN + SHIFT + (TURN if pose else ())
 
 
 def unknowns_jacobian(
@@ -187,5 +211,5 @@ def unknowns_jacobian(
     jacobian, _ = linearise(problem, arm.table, setup)
     if arm.world_is_known:
         return jacobian, wanted
-    own = setup_jacobian(problem, arm.table, setup)[:, :, : len(SETUP_KINDS)]
-    return np.concatenate([own, jacobian], axis=2), [*SETUP_KINDS, *wanted]
+    own = setup_jacobian(problem, arm.table, setup)
+    return np.concatenate([own, jacobian], axis=2), [*setup_kinds(arm, pose=pose), *wanted]

@@ -58,7 +58,8 @@ class JointSpace:
         robot: The nominal arm.
         low: Lowest readings (D,) of the joints; their limits by default.
         high: Highest ones.
-        joints: Which, from 1.
+        joints: Which, from 1: by default 1, 2 and 3, as the paper divides its space. To calibrate all joints
+            they all have to move, as with range(1, 7).
         held: Readings (N,) of the others; zero by default.
     """
 
@@ -112,7 +113,7 @@ class CartesianSpace:
         high: Highest.
         origin: In the base frame (3,), m.
         configuration: The branch; CEPs differ between branches, section 4.2 of the paper.
-        joints: The three that reach, from 1.
+        joints: The three that reach, from 1; 1, 2 and 3 by default.
         held: Readings (N,) of the others; zero by default.
     """
 
@@ -171,7 +172,8 @@ class SphericalSpace(CartesianSpace):
     """Positions by radius, azimuth and elevation from `origin`, as in Figure 4(c) of the paper.
 
     x = R cos(phi) sin(theta), y = R cos(phi) cos(theta), z = R sin(phi): theta turns from the y axis to the x
-    axis, phi rises from the plane. `low` and `high` are (R, theta, phi) in m and rad.
+    axis, phi rises from the plane. `low` and `high` are (R, theta, phi) in m and rad. Joints 1, 2 and 3 reach
+    by default, and the others are held at zero, as in `CartesianSpace`.
     """
 
     @property

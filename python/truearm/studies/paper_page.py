@@ -62,7 +62,8 @@ READINGS: Final = (
     ),
     (
         "CEP jump",
-        "Largest change of any of the parameters between neighbouring points of 200, angles at 300 mm.",
+        "Largest change of any of the parameters between neighbouring points of 200, for each mm of path "
+        "between them, angles at 300 mm.",
     ),
 )
 TABLES: Final = ("figure6", "noise", "figure7", "figure8", "paths", "cmac")
@@ -125,7 +126,8 @@ def _schemes(found: Result) -> str:
         pieces = {f" {where}": path[where] for where in ("inside", "rest") if where in path} or {"": path}
         for where, piece in pieces.items():
             rows.append((f"{name}{where}", *_numbers(piece), *_workspace(part)))
-    head = ("scheme", "path mean mm", "max mm", "error jump mm", "CEP jump", "workspace mean mm", "max mm")
+    on_path = ("path mean mm", "max mm", "error jump mm", "CEP jump mm/mm")
+    head = ("scheme", *on_path, "workspace mean mm", "max mm")
     return table(head, rows)
 
 

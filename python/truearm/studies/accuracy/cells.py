@@ -7,7 +7,7 @@ from typing import Final
 from truearm.defaults import SEED
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names
 from truearm.studies.accuracy.sets import DataSet, read_set
-from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide, rows_of
+from truearm.studies.accuracy.splits import TITLES, Cut, Kind, cuts, divide, rows_of, why_no_cut
 
 ALL: Final = "all"
 MOST_TRAINING: Final = 2000
@@ -44,12 +44,14 @@ class Asked:
         split_by: Columns of the split "groups".
         sizes: Numbers of training poses, and "all".
         seeds: Seeds.
+        stated: Those of the kinds that were named: of these it is told where a set does not allow them.
     """
 
     kinds: tuple[Kind, ...]
     split_by: tuple[str, ...]
     sizes: tuple[str, ...]
     seeds: tuple[int, ...]
+    stated: tuple[Kind, ...] = ()
 
 
 def parse_sizes(text: str) -> tuple[str, ...]:
@@ -126,8 +128,11 @@ def _unaskable(data_set: DataSet, asked: Asked) -> str:
 
 
 def _left_out(data_set: DataSet, asked: Asked) -> list[Notice]:
-    """Notices of the splits that a set does not allow, each with the seeds and sizes that it is so of."""
-    notices = []
+    """Notices of the splits that a set does not allow, and of which seeds and sizes where it is not all."""
+    notices, read = list[Notice](), read_set(data_set)
+    for kind in asked.stated:
+        if why := why_no_cut(read, kind, asked.split_by):
+            notices.append(Notice("no_split", f"Left out of {data_set.name}: {TITLES[kind]}, because {why}."))
     for words, found in _refused(data_set, asked).items():
         seeds, sizes = (list(dict.fromkeys(each)) for each in zip(*found, strict=True))
         of = f"seed {', '.join(map(str, seeds))}; poses {', '.join(sizes)}"

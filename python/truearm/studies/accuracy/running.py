@@ -40,7 +40,8 @@ class Where:
     Attributes:
         scheduler: Address of a Dask scheduler, whose workers see the same files; None for this machine.
         workers: Processes on this machine.
-        again: Methods whose results are found again.
+        again: Methods of the study whose results are found anew; an interrupted run of the same request goes
+            on.
     """
 
     scheduler: str | None = None
@@ -70,7 +71,8 @@ def conduct(study: Study, directory: Path, where: Where, told: Progress) -> Outc
     """Run the study as far as its results are not in the directory.
 
     A method that cannot be fitted to some rows says so in its result; one that breaks is named in the
-    outcome, and is tried again the next time.
+    outcome, and is tried again the next time. Results that are asked for anew are missing until they are
+    found, and stay in the directory until then.
 
     Raises:
         UsageError: If a library of a method is missing, or workers contradict each other.
@@ -80,9 +82,10 @@ def conduct(study: Study, directory: Path, where: Where, told: Progress) -> Outc
     check_workers(where.scheduler, where.workers)
     require(BY_NAME[name].needs for name in study.methods)
     jobs, kept = list(_jobs(study)), Kept(directory)
-    if where.again:
-        kept.forget(part for name in where.again for part in (name, *BY_NAME[name].parts))
-    missing = [job for job in jobs if any(key not in kept.records for key in _keys(job))]
+    anew = {key for job in jobs if job.method in where.again for key in _keys(job)}
+    if anew:
+        kept.find_anew(anew)
+    missing = [job for job in jobs if not all(map(kept.is_there, _keys(job)))]
     run, errors, before = 0, dict[str, str](), len(jobs) - len(missing)
     told("comparing methods", before, len(jobs))
     tasks = run_tasks(run_job, missing, scheduler=where.scheduler, workers=where.workers)
@@ -95,6 +98,7 @@ def conduct(study: Study, directory: Path, where: Where, told: Progress) -> Outc
             else:
                 errors[missing[done.index].method] = done.trace or str(done.error)
             told("comparing methods", count, len(jobs))
+    kept.tidy()
     found = _gathered(jobs, kept)
     found.run, found.errors = run, errors
     return found
@@ -111,7 +115,7 @@ def so_far(study: Study, directory: Path) -> Outcome:
 
 def _gathered(jobs: Sequence[Job], kept: Kept) -> Outcome:
     keys = [key for job in jobs for key in _keys(job)]
-    return Outcome([kept.records[key] for key in keys if key in kept.records], len(keys))
+    return Outcome([kept.records[key] for key in keys if kept.is_there(key)], len(keys))
 
 
 def _jobs(study: Study) -> Iterator[Job]:

@@ -109,6 +109,21 @@ def cuts(read: Read, kinds: Sequence[Kind], split_by: Sequence[str], turn: int) 
     return found
 
 
+def why_no_cut(read: Read, kind: Kind, split_by: Sequence[str]) -> str:
+    """Why a set does not allow a kind of split, in words; empty where it does."""
+    if cuts(read, (kind,), split_by, 0):
+        return ""
+    if kind == "tails":
+        return "no joint moves"
+    if kind == "target":
+        return "one target was measured"
+    known = split_columns(read.data)
+    absent = [name for name in split_by if name not in known]
+    if absent:
+        return f"it has no column {list_names(absent)}"
+    return f"few of its rows are equal to others in {list_names(split_by)}"
+
+
 @lru_cache(maxsize=512)
 def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
     """Training rows, of which the first are taken, and held-out rows, MOST_JUDGED at the most.

@@ -45,7 +45,7 @@ READINGS: Final = (
         "rounded to 0.1 mm. Ours is the variable model on the same rows with the base as a row of its own.",
     ),
 )
-HEAD: Final = ("scheme", "least mm", "mean mm", "max mm", "error jump mm", "CEP jump", "unreached")
+HEAD: Final = ("scheme", "least mm", "mean mm", "max mm", "error jump mm", "CEP jump mm/mm", "unreached")
 
 
 def page(result: Result) -> str:
