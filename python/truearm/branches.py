@@ -23,7 +23,7 @@ def crossed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
 
     One within EDGE_RAD of either does not count: rounded readings do not tell on which side of it they are.
     """
-    return _crossings(inverse, q, before).any(axis=1)
+    return np.asarray(_crossings(inverse, q, before).any(axis=1))
 
 
 def strayed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
@@ -34,7 +34,7 @@ def strayed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
     one, and the core is right, if this one alone is so near that what is corrected may take a joint over it.
     """
     crossings = _crossings(inverse, q, before)
-    found: Bools = crossings.any(axis=1)
+    found: Bools = np.asarray(crossings.any(axis=1))
     (asked,) = np.nonzero(found)
     if len(asked):
         far = _told(inverse, q[asked], CORRECTION_RAD) & _told(inverse, before[asked], CORRECTION_RAD)
@@ -72,7 +72,7 @@ def starts(inverse: Inverse, base_from_flange: Floats, seeds: Floats, *, nearest
 
 def _crossings(inverse: Inverse, q: Floats, before: Floats) -> Bools:
     """Which sides (n, S) differ between two readings that both tell them."""
-    differ = inverse.sides(q) != inverse.sides(before)
+    differ: Bools = inverse.sides(q) != inverse.sides(before)
     (asked,) = np.nonzero(differ.any(axis=1))
     if len(asked):
         differ[asked] &= _told(inverse, q[asked]) & _told(inverse, before[asked])
@@ -91,4 +91,5 @@ def _told(inverse: Inverse, q: Floats, by_rad: float = EDGE_RAD) -> Bools:
     steps = by_rad * np.eye(q.shape[1])[inverse.robot.revolute]
     around = q[:, None] + np.concatenate([steps, -steps])
     sides = inverse.sides(around.reshape(-1, q.shape[1])).reshape(*around.shape[:2], -1)
-    return (sides == sides[:, :1]).all(axis=1)
+    told: Bools = (sides == sides[:, :1]).all(axis=1)
+    return told

@@ -139,7 +139,8 @@ class Inverse:
         rows, _ = as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
         branches = self._solver.branches(rows)
         if any(sides is None for sides in branches):
-            return np.linalg.det(self.robot.joint_jacobian(rows, pose=True))[:, None] > 0.0
+            positive: Bools = np.linalg.det(self.robot.joint_jacobian(rows, pose=True))[:, None] > 0.0
+            return positive
         named = np.array(branches, dtype=bool).reshape(-1, len(SIDES))
         named[:, 1] ^= named[:, 0]
         return named
