@@ -11,12 +11,12 @@ from tests.programs_rig import ABB, KUKA, models, read
 from tests.programs_rig import rewritten as rewrite_with
 from tests.test_programs_rapid import numbers
 from truearm.inverse import Inverse
-from truearm.programs.configuration import NearestTurns
 from truearm.programs.densify import ELSEWHERE, Spacing
 from truearm.programs.following import UNFOLLOWED, Arrived, Follower, Line, Way
 from truearm.programs.solving import CONTRADICTS
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
+from truearm.turns import NearestTurns
 
 UR10 = Robot.load("ur10")
 STARTS = {

@@ -10,7 +10,6 @@ from tests.programs_rig import ABB, KUKA, Shift, again, models, obeyed, read, re
 from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.programs.configuration import NearestTurns, with_turns
 from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
@@ -23,6 +22,7 @@ from truearm.programs.rewriting import Choices, rewrite
 from truearm.programs.solving import LEAST_GAIN, are_singular
 from truearm.programs.source import Source
 from truearm.robot import Robot
+from truearm.turns import NearestTurns, with_turns
 
 TWO = f"MoveJ pA,{GO}\nMoveJ pB,{GO}"
 

@@ -9,7 +9,6 @@ import pytest
 import truearm as ta
 from tests.program_tools import Bend, read, reasons, rewritten
 from truearm.cli import main
-from truearm.programs.configuration import NearestTurns, with_turns
 from truearm.programs.densify import Spacing
 from truearm.programs.krl import KRL
 from truearm.programs.melfa import MelfaBasic
@@ -17,6 +16,7 @@ from truearm.programs.rapid import RAPID
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
+from truearm.turns import NearestTurns, with_turns
 
 KUKA, ABB, UR10 = (Robot.load(name) for name in ("kuka-kr-6-r900", "abb-irb-120", "ur10"))
 IN_KRL = """DEF p()

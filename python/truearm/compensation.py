@@ -19,13 +19,13 @@ from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.named_values import check_readings
 from truearm.robot import Robot
+from truearm.searching import Search
 from truearm.solving import (
     as_seed,
     calibrated_model,
     core_options,
     feature_names,
     feature_values,
-    left_branch,
     moving_joints,
     plain_model,
 )
@@ -186,8 +186,8 @@ class Compensator:
             base_from_tool: Targets (n, 4, 4), or (4, 4) for one, which is a path of one as in `joints`.
             seed: Readings (n, N), near which the solution of each target is looked for; or (N,), near which
                 that of the first is, and of each other one near the one before. A solution on another branch
-                is refused: there the Jacobian's determinant has another sign, or the branch, of an arm that
-                can name it, another name. On which turn a joint is, the search from the seed tells.
+                of a six-axis arm is refused. A seed within 0.01 deg of a singularity is on the branches of
+                both its sides. On which turn a joint is, the search from the seed tells.
             tool: As for `joints`.
 
         Raises:
@@ -198,12 +198,11 @@ class Compensator:
         options = core_options(self.programming, self.task, None, self.limits)
         try:
             solver = Solver(self._programming, flange_from_tool, options)
-            rows, _, refused = solver.solve(poses, seeds, [])
+            search = Search(self.programming, solver, self.task, flange_from_tool, [])
+            rows, refused = search.near(poses, seeds)
         except CoreError as error:
             raise InputError(str(error)) from None
-        strays = left_branch(self.programming, self.task, rows, seeds)
-        rows[[place for place, _, _ in strays]] = np.nan
-        unsolved = {place: Refusal(place + 1, reason, code) for place, code, reason in [*refused, *strays]}
+        unsolved = {place: Refusal(place + 1, reason, code) for place, (code, reason) in refused.items()}
         return self._corrected(rows, flange_from_tool, unsolved)
 
     def correct(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Floats:

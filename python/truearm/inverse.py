@@ -12,6 +12,7 @@ from truearm.errors import InputError, WorkError, count_of, list_rows
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 SIDES: Final = (("rear", "front"), ("down", "up"), ("noflip", "flip"))
 
@@ -127,6 +128,22 @@ class Inverse:
         """
         rows, _ = as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
         return [_name(sides) for sides in self._solver.branches(rows)]
+
+    def sides(self, q: ArrayLike) -> Bools:
+        """Internal: on which side of each singularity the arm stands at readings (n, N), (n, S).
+
+        Of an arm whose branches have names these are the shoulder's, the elbow's and the wrist's, of which
+        the elbow's does not depend on the shoulder's as its name does; of any other one that of its
+        Jacobian's determinant, which each singularity changes.
+        """
+        rows, _ = as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
+        branches = self._solver.branches(rows)
+        if any(sides is None for sides in branches):
+            positive: Bools = np.linalg.det(self.robot.joint_jacobian(rows, pose=True))[:, None] > 0.0
+            return positive
+        named = np.array(branches, dtype=bool).reshape(-1, len(SIDES))
+        named[:, 1] ^= named[:, 0]
+        return named
 
     def _near(self, base_from_flange: ArrayLike, seed: ArrayLike) -> tuple[Floats, bool]:
         poses, single = as_transforms(base_from_flange, what="poses")

@@ -13,10 +13,10 @@ from truearm.certainty.uncertainty import ConstantSpread
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_rows
 from truearm.fits.endpoints import at_tool
 from truearm.inputs import feature_columns
-from truearm.inverse import Inverse
 from truearm.limits import TASKS, Limits, Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.searching import Search
 
 if TYPE_CHECKING:
     from truearm._core import CorrectorOptions
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FEATURE_RANGE: Final = "feature_range"
-BRANCH: Final = (11, "the solution lies on another branch of the arm than its seed")
-"""Code and reason of a refusal, as the core has them."""
-POSE_JOINTS: Final = 6
-"""Joints that a pose needs: with as many there are branches."""
 MARGIN: Final = 0.02
 """A feature may lie outside of what was learnt by so much of its range: curves go on smoothly there."""
 
@@ -180,30 +176,6 @@ def as_seed(robot: Robot, seed: ArrayLike, count: int) -> Floats:
     return rows
 
 
-def left_branch(robot: Robot, task: Task, readings: Floats, seed: Floats) -> list[tuple[int, int, str]]:
-    """Refusals (place, code, reason) of solutions on another branch that the core took for their seed's.
-
-    It looks at the determinant of the Jacobian, which has its sign again where an arm turned over twice, as
-    shoulder and elbow do together. Arms whose branches have names are asked for these too. Where a name alone
-    changes, and the sign with it, the calibrated arm is on the other side of a singularity than the nominal
-    one that is named, and the core has looked.
-
-    Args:
-        robot: The nominal arm.
-        task: What was met.
-        readings: Solutions (n, N), NaN where there is none.
-        seed: Readings (n, N), or (N,) for all.
-    """
-    if task != "pose" or robot.joint_count != POSE_JOINTS:
-        return []
-    solved = np.flatnonzero(np.isfinite(readings).all(axis=1))
-    found, seeds = readings[solved], np.atleast_2d(seed if seed.ndim == 1 else seed[solved])
-    inverse = Inverse(robot)
-    renamed = np.array(inverse.branch_names(found)) != np.array(inverse.branch_names(seeds))
-    signs = [np.sign(np.linalg.det(robot.joint_jacobian(q, pose=True))) for q in (found, seeds)]
-    return [(place, *BRANCH) for place in solved[renamed & (signs[0] == signs[1])].tolist()]
-
-
 def solve(
     calibration: "Calibration",
     base_from_tool: ArrayLike,
@@ -220,14 +192,15 @@ def solve(
     options = core_options(robot, task, None, Limits())
     values = feature_values(calibration, features)
     try:
-        solver = Solver(calibrated_model(calibration), at_tool(robot, tool), options)
-        readings, _, refused = solver.solve(poses, seeds, values)
+        flange_from_tool = at_tool(robot, tool)
+        solver = Solver(calibrated_model(calibration), flange_from_tool, options)
+        readings, refused = Search(robot, solver, task, flange_from_tool, values).near(poses, seeds)
     except CoreError as error:
         raise InputError(str(error)) from None
-    refused = sorted(refused + left_branch(robot, task, readings, seeds))
     if refused:
+        _, reason = refused[min(refused)]
         raise WorkError(
-            f"{list_rows([place + 1 for place, _, _ in refused], 'pose')} cannot be reached: {refused[0][2]}",
+            f"{list_rows([place + 1 for place in sorted(refused)], 'pose')} cannot be reached: {reason}",
             rule="A solution lies within the joint limits, on the seed's branch",
             way_out="Give a seed nearer to the solution; truearm.inverse.Inverse(robot) finds the flange's",
         )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.controller import Controller
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, Configuration, with_turns
+from truearm.programs.configuration import ANY, Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, numbers_of
@@ -16,6 +16,7 @@ from truearm.programs.solving import AT_ONCE, are_singular
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
+from truearm.turns import with_turns
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]

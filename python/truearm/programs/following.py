@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import NearestTurns
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_rotation_vector, rigid_inverse, rotation_vector_from_matrix
+from truearm.turns import NearestTurns
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, EDGE_RAD, NearestTurns, meant, with_turns
+from truearm.programs.configuration import ANY, meant
 from truearm.programs.following import CLOSE_RAD, Arrived, Follower, Way
 from truearm.programs.layouts import of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight, numbers_of
@@ -21,6 +21,7 @@ from truearm.programs.tables import NOWHERE, Motion, placed, run_of
 from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
+from truearm.turns import EDGE_RAD, NearestTurns, with_turns
 from truearm.units import FULL_TURN
 
 Floats = NDArray[np.float64]
