@@ -1,11 +1,13 @@
 """Targets, joints and set-ups that stand otherwise from some row on are told, with row, size and way out."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.cli import update as of_command
 from truearm.doubts.at_once import (
     AT_ONCE,
     JOINT,
@@ -18,14 +20,17 @@ from truearm.doubts.at_once import (
 )
 from truearm.doubts.moved_joints import JOINTS_MOVED
 from truearm.fleet.doubted import grave_notices
+from truearm.programs.notices import update_notices
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
+from truearm.reporting.since_update import since_update
 from truearm.rotations import (
     matrix_from_quaternion,
     matrix_from_rotation_vector,
     quaternion_from_matrix,
 )
 from truearm.simulation import Imperfections, VirtualArm
+from truearm.update_words import MEANWHILE
 
 ROWS = 50
 HALF = ROWS // 2
@@ -141,14 +146,36 @@ def test_a_device_that_turns_is_told(arm, steady):
     assert "between row 25 and row 26" in notices[SETUP_TURNED].lower()
 
 
-def test_evaluations_and_updates_do_not_blame_the_calibration(arm, known):
-    data = with_slip(arm, arm.measure(arm.poses(HALF, seed=7)), HALF // 2)
-    judged, found = ta.evaluate(known[0], data), ta.update(known[0], data)
+@pytest.fixture(scope="module")
+def again(arm):
+    return with_slip(arm, arm.measure(arm.poses(HALF, seed=7)), HALF // 2)
+
+
+@pytest.fixture(scope="module")
+def updated(known, again):
+    return ta.update(known[0], again)
+
+
+def test_evaluations_and_updates_do_not_blame_the_calibration(known, again, updated):
+    judged, found = ta.evaluate(known[0], again), updated
     assert list(told(judged.notices)) == [TARGET_SLIPPED]
     assert "not_as_calibrated" not in {notice.kind for notice in judged.notices}
     assert found.verdict == "field"
     assert found.changed_meanwhile
     assert "calibrate_anew" not in {advice.kind for advice in advise(Facts(found.calibration), None)}
+
+
+@pytest.mark.parametrize("verdict", ["holds", "moved", "field"])
+def test_what_slipped_is_put_right_first_whatever_an_update_found(known, updated, verdict, capsys):
+    found = replace(updated, verdict=verdict)
+    assert MEANWHILE in of_command._verdict(found)
+    of_command._suggest(found, known[0], Path("arm.calib"), Path("new.calib"), "new.csv")
+    assert capsys.readouterr().out == ""
+    revision = updated.calibration.revision
+    told = replace(revision, report={**revision.report, "verdict": verdict})
+    calibration = replace(updated.calibration, revision=told)
+    assert MEANWHILE in since_update(Facts(calibration)).parts[0].words
+    assert MEANWHILE in str(update_notices(calibration)[0])
 
 
 @pytest.fixture(scope="module")
