@@ -243,9 +243,8 @@ def _words(session: Session, step: Step) -> str:
         return f"{where} {_of_target(session.by, step)}. {OWN_GROUP}"
     far = length_mm(session.by.way_mm(step), DIGITS)
     if step.shape.what == FRAME:
-        turn = float(MRAD_PER_RAD * np.linalg.norm(step.sizes))
         return (
-            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by "
+            f"{where} the measuring device, or the arm's base, turned by {_mrad(step.sizes)} (points by "
             f"{far} on average). {OWN_GROUP}"
         )
     what, way_out = _of_joints(session, step)
@@ -256,20 +255,24 @@ def _of_target(by: Derivatives, step: Step) -> str:
     """Which targets slipped, or turned, and how far."""
     numbers = step.shape.numbers
     shifts, turn = np.split(step.sizes, [AXES * len(numbers)])
-    mrad = f"{MRAD_PER_RAD * np.linalg.norm(turn):.{DIGITS}g} mrad"
     if not numbers:
-        return f"the target turned on the tool by {mrad}, about itself"
+        return f"the target turned on the tool by {_mrad(turn)}, about itself"
     by_mm = MM_PER_METRE * shifts.reshape(-1, AXES)
     how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
     if len(numbers) > 1:
         return f"the targets slipped on the tool, or were put elsewhere on it, {how}"
     axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
     what = "the target" if len(by.targets) == 1 else f"target {numbers[0] + 1}"
-    turned = f", and turned by {mrad}" if len(turn) else ""
+    turned = f", and turned by {_mrad(turn)}" if len(turn) else ""
     return (
         f"{what} slipped on the tool, or was put elsewhere on it, {how} (along the flange's axes {axes} mm)"
         f"{turned}"
     )
+
+
+def _mrad(turn: Floats) -> str:
+    """The size of a turn (3,), rad, in words."""
+    return f"{float(f'{MRAD_PER_RAD * np.linalg.norm(turn):.{DIGITS}g}'):g} mrad"
 
 
 def _of_joints(session: Session, step: Step) -> tuple[str, str]:
