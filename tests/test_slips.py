@@ -174,7 +174,7 @@ def test_what_slipped_is_put_right_first_whatever_an_update_found(known, updated
     revision = updated.calibration.revision
     told = replace(revision, report={**revision.report, "verdict": verdict})
     calibration = replace(updated.calibration, revision=told)
-    assert MEANWHILE in since_update(Facts(calibration)).parts[0].words
+    assert MEANWHILE in str(since_update(Facts(calibration)).parts[0])
     assert MEANWHILE in str(update_notices(calibration)[0])
 
 
