@@ -98,6 +98,15 @@ def test_a_joint_that_changes_its_sign_is_named_with_the_row(few_joints, rows, w
     assert f"if joint 3 is counted the other way {words}" in said, said
 
 
+@pytest.mark.parametrize("turned", [slice(22), slice(22, 50)])
+def test_a_joint_with_another_sign_in_one_set_up_is_named_with_it(few_joints, turned):
+    table = few_joints.measure_table(few_joints.poses(50)).assign(group=["a"] * 22 + ["b"] * 28)
+    table.loc[table.index[turned], "q3"] *= -1.0
+    said, group = notice_of(told_of(few_joints, table), "fits_otherwise"), table["group"][turned].iloc[0]
+    assert f"The measurements of {group} fit" in said
+    assert f"if joint 3 is counted the other way in all rows of {group}. Give all" in said
+
+
 def named_otherwise(name, **otherwise):
     robot, data = measured_otherwise(name, **otherwise)
     return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")

@@ -8,6 +8,7 @@ import pytest
 import truearm as ta
 from truearm.doubts.outliers import Outliers
 from truearm.reporting.facts import Facts
+from truearm.reporting.verdict import head
 from truearm.simulation import Imperfections, VirtualArm
 
 ARM = VirtualArm(ta.Robot.load("ur5e"), seed=4, imperfections=Imperfections(share=0.0, noise_mm=0.02))
@@ -66,7 +67,10 @@ def test_errors_are_told_without_distances_that_are_far_off(tmp_path):
     outliers = Outliers.of(again)
     assert outliers.judged.startswith(f"row {HELD[2] + 1} (49.9")
     assert outliers.means_mm["constant"] < 0.1 < found.validation.holdout["constant"].position.mean
-    assert Facts(again).mean_mm() == outliers.means_mm["constant"]
+    assert Facts(again).mean_mm() == pytest.approx(outliers.means_mm["constant"])
+    said = head(Facts(again), []).verdict.partition("Without the outliers among them, ")[2]
+    assert said.startswith(outliers.judged)
+    assert f"they are {outliers.means_mm['constant']:.3f} mm" in said
 
 
 def test_both_rows_of_a_pair_are_named():

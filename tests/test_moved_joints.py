@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from truearm.doubts.at_once import JOINT_MOVED
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.row_order import FEWEST_VISITS
 from truearm.doubts.whitened import MOST_VALUES, Whitened
@@ -74,6 +75,15 @@ def test_an_arm_that_gives_way_under_loads_names_their_column(arm):
     lever = arm.robot.joint_jacobian(arm.poses(ROWS))[:, 2]
     notices, _ = told(arm, -3e-5 * lever * load[:, None], {"payload_kg": load})
     assert "--features payload_kg" in notices[UNUSED_COLUMN]
+
+
+def test_a_column_that_changes_where_a_joint_moves_is_named_with_it(arm):
+    load, humidity = np.where(np.arange(ROWS) < 30, 0.0, 8.0), np.tile([40.0, 60.0], ROWS // 2)
+    turned = np.outer(load, [0.0, -5e-5, 0.0, 0.0, 0.0, 0.0])
+    notices, _ = told(arm, turned, {"payload_kg": load, "humidity": humidity})
+    assert "joint 2 moved by -0.02" in notices[JOINT_MOVED]
+    assert "But payload_kg changes there as well: if it is what moves" in notices[JOINT_MOVED]
+    assert "calibrate with --features payload_kg" in notices[JOINT_MOVED]
 
 
 def test_an_arm_that_does_not_move_is_not_doubted(arm):

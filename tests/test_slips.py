@@ -1,11 +1,13 @@
 """Targets, joints and set-ups that stand otherwise from some row on are told, with row, size and way out."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.cli import update as of_command
 from truearm.doubts.at_once import (
     JOINT,
     JOINT_MOVED,
@@ -18,10 +20,17 @@ from truearm.doubts.at_once import (
 )
 from truearm.doubts.moved_joints import JOINTS_MOVED
 from truearm.fleet.doubted import grave_notices
+from truearm.programs.notices import update_notices
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
-from truearm.rotations import matrix_from_rotation_vector
+from truearm.reporting.since_update import since_update
+from truearm.rotations import (
+    matrix_from_quaternion,
+    matrix_from_rotation_vector,
+    quaternion_from_matrix,
+)
 from truearm.simulation import Imperfections, VirtualArm
+from truearm.update_words import MEANWHILE
 
 ROWS = 50
 HALF = ROWS // 2
@@ -81,6 +90,14 @@ def test_a_target_that_slips_is_told_with_row_and_size(slipped):
     assert said in grave_notices(found)
 
 
+def test_of_several_targets_the_one_that_slips_has_the_number_of_its_columns(arm, steady):
+    further = 0.05 * arm.true_pose(steady.readings)[:, :3, 0] @ arm.world_from_base[:3, :3].T
+    third = with_slip(arm, arm.measure(steady.readings, seed=1)).targets + further[:, None]
+    targets = np.hstack([steady.targets, np.full_like(third, np.nan), third])
+    _, notices = calibrated(arm, replace(steady, targets=targets))
+    assert "target 3 slipped on the tool" in notices[TARGET_SLIPPED]
+
+
 def test_the_report_puts_it_first_and_advises_no_more_poses(slipped):
     advice = advise(Facts(slipped[0]), None)
     assert slipped[1][TARGET_SLIPPED] in advice[0].words
@@ -109,6 +126,18 @@ def test_a_joint_that_moves_at_once_does_not_warm_up(arm, grouped):
     assert "calibrate from those behind alone" in said
 
 
+def test_a_joint_that_moves_is_told_by_its_reading_where_that_turns_others_and_counts_the_other_way(arm):
+    coupling = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    coupling[2, 1] = -1.0
+    coupled = replace(arm.robot, coupling=coupling)
+    of_coupled = VirtualArm(coupled, seed=4, imperfections=arm.imperfections)
+    readings, turned = of_coupled.poses(ROWS), np.zeros((ROWS, 6))
+    turned[HALF:, 1] = np.radians(0.05)
+    _, notices = calibrated(of_coupled, replace(of_coupled.measure(readings + turned), readings=readings))
+    size = notices[JOINT_MOVED].split("joint 2 moved by ")[1].split(" deg")[0]
+    assert float(size) == pytest.approx(0.05, rel=0.15)
+
+
 def test_a_device_that_turns_is_told(arm, steady):
     turn = matrix_from_rotation_vector([0.0, 3e-4, 0.0])
     targets = steady.targets.copy()
@@ -117,14 +146,56 @@ def test_a_device_that_turns_is_told(arm, steady):
     assert "between row 25 and row 26" in notices[SETUP_TURNED].lower()
 
 
-def test_evaluations_and_updates_do_not_blame_the_calibration(arm, known):
-    data = with_slip(arm, arm.measure(arm.poses(HALF, seed=7)), HALF // 2)
-    judged, found = ta.evaluate(known[0], data), ta.update(known[0], data)
+@pytest.fixture(scope="module")
+def again(arm):
+    return with_slip(arm, arm.measure(arm.poses(HALF, seed=7)), HALF // 2)
+
+
+@pytest.fixture(scope="module")
+def updated(known, again):
+    return ta.update(known[0], again)
+
+
+def test_evaluations_and_updates_do_not_blame_the_calibration(known, again, updated):
+    judged, found = ta.evaluate(known[0], again), updated
     assert list(told(judged.notices)) == [TARGET_SLIPPED]
     assert "not_as_calibrated" not in {notice.kind for notice in judged.notices}
     assert found.verdict == "field"
     assert found.changed_meanwhile
     assert "calibrate_anew" not in {advice.kind for advice in advise(Facts(found.calibration), None)}
+
+
+@pytest.mark.parametrize("verdict", ["holds", "moved", "field"])
+def test_what_slipped_is_put_right_first_whatever_an_update_found(known, updated, verdict, capsys):
+    found = replace(updated, verdict=verdict)
+    assert MEANWHILE in of_command._verdict(found)
+    of_command._suggest(found, known[0], Path("arm.calib"), Path("new.calib"), "new.csv")
+    assert capsys.readouterr().out == ""
+    revision = updated.calibration.revision
+    told = replace(revision, report={**revision.report, "verdict": verdict})
+    calibration = replace(updated.calibration, revision=told)
+    assert MEANWHILE in str(since_update(Facts(calibration)).parts[0])
+    assert MEANWHILE in str(update_notices(calibration)[0])
+
+
+@pytest.fixture(scope="module")
+def posed(arm):
+    data = arm.measure(arm.poses(ROWS), orientation=True)
+    return ta.calibrate(arm.robot, data, model="constant", refit=False, holdout=0.1)
+
+
+@pytest.mark.parametrize("slips", [False, True])
+def test_a_target_that_turns_is_told_and_slips_only_where_it_does(arm, posed, slips):
+    data = arm.measure(arm.poses(HALF, seed=7), orientation=True)
+    turn = np.tile(np.eye(3), (HALF, 1, 1))
+    turn[HALF // 2 :] = matrix_from_rotation_vector([0.0, 2e-3, 0.0])
+    turned = replace(
+        data, orientations=quaternion_from_matrix(matrix_from_quaternion(data.orientations) @ turn)
+    )
+    found = ta.update(posed, with_slip(arm, turned, HALF // 2) if slips else turned)
+    said = told(found.notices)[TARGET_SLIPPED]
+    assert ("slipped on the tool" in said) is slips
+    assert float(said.split("turned")[1].split(" by ")[1].split(" mrad")[0]) == pytest.approx(2.0, rel=0.15)
 
 
 def noise_alone(rng, visits):

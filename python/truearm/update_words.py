@@ -16,6 +16,12 @@ MEANWHILE: Final = (
     "calibration before once more, which may still hold."
 )
 """What to do with an update from rows that something slipped between."""
+CHANGED_MEANWHILE: Final = {
+    "holds": f"No significant change was found. {MEANWHILE}",
+    "moved": f"{{tested}} changed, as far as these rows tell. {MEANWHILE}",
+    "field": f"{{estimated}} do not explain what was measured. {MEANWHILE}",
+}
+"""What an update from such rows found, by its verdict; `tested` and `estimated` are listed."""
 FIVE_OF_SIX: Final = (
     "As a row of the table the base has five of the six freedoms of a frame: constants do not correct a "
     "shift along the sixth, the y axis of most bases."

@@ -164,7 +164,7 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
         place: The file that was written, if any.
         given: The measurements, and the options that the command was given, as they were typed.
     """
-    if found.verdict == "field" and found.changed_meanwhile:
+    if found.changed_meanwhile:
         return
     if found.verdict == "field":
         anew = calibrate_anew(known)
@@ -184,21 +184,22 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.update_words import MEANWHILE, of_known_world, untested_joints, way_out_of_keeping
+    from truearm.update_words import CHANGED_MEANWHILE, of_known_world, untested_joints, way_out_of_keeping
 
+    tested, estimated = listed(found.tested, "or").capitalize(), listed(found.estimated)
+    if found.changed_meanwhile:
+        return CHANGED_MEANWHILE[found.verdict].format(tested=tested, estimated=estimated.capitalize())
     untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
         return f"The calibration still holds: no significant change was found. {untested}".strip()
     if found.verdict == "moved":
         return (
-            f"{listed(found.tested, 'or').capitalize()} changed. All else still fits, so the updated "
+            f"{tested} changed. All else still fits, so the updated "
             f"calibration replaces the old one. {untested}"
         ).strip()
-    if found.changed_meanwhile:
-        return f"{listed(found.estimated).capitalize()} do not explain what was measured. {MEANWHILE}"
     kept, base = way_out_of_keeping(found.kept), of_known_world(found.to_dict())
     return (
-        f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
+        f"The calibration itself no longer fits: {estimated} do not explain what was measured. "
         f"{kept and f'{kept}. '}{base and f'{base} '}Check that these are measurements of this arm. If they "
         "are, measure anew and calibrate. If the measuring device scatters more than when the arm was "
         "calibrated, say so in a column sigma_mm and update again."

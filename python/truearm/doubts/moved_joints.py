@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
+from truearm.doubts.at_once import BESIDE, JOINT_MOVED
 from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, poses_of, share_explained
 from truearm.doubts.slips import Slip
 from truearm.doubts.whitened import AXES, Whitened
@@ -34,6 +35,8 @@ MOSTLY: Final = 0.5
 """Share of the steps from visit to visit at which what goes with the time changes."""
 EVEN: Final = 1e-4
 """Part of their range by which values differ at the most from what counts rows."""
+NEARLY: Final = 2
+"""Visits by which the place of a step may be told wrongly."""
 KNOWN: Final = "known where programs run, as a temperature is and a time is not"
 
 
@@ -52,6 +55,12 @@ class Asked:
     values: Floats
     lacking: int = 0
     as_time: bool = False
+
+    def changes_at(self, visit: int) -> bool:
+        """Whether it stands at one value before a visit, or one near it, and at another from there on."""
+        seen = self.values[max(visit - BESIDE, 0) : visit + BESIDE]
+        places = range(max(BESIDE - NEARLY, 1), min(BESIDE + NEARLY, len(seen) - 1) + 1)
+        return any(abs(seen[k] - seen[k - 1]) > max(np.ptp(seen[:k]), np.ptp(seen[k:])) for k in places)
 
     @property
     def reach(self) -> float:
@@ -86,7 +95,7 @@ def moved_joints(
     found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats, slips: Sequence[Slip]
 ) -> list[Notice]:
     """A warning where joints move with a column that is not used, or with the order of the rows; where a step
-    explains more, what stands otherwise from some row on.
+    explains more, what stands otherwise from some row on, with the columns that change there.
 
     Args:
         found: A calibration of what varies: constants leave too much that poses explain.
@@ -97,13 +106,11 @@ def moved_joints(
     """
     if found.variable is None or len(seen.rows) < FEWEST_VISITS:
         return []
-    asked = list(_asked(found, rows, seen, progress))
-    told = [
-        moved for column in asked if (moved := _moved(found, seen, column)).chance * len(asked) < OVERWHELMING
-    ]
+    asked = [_moved(found, seen, column) for column in _asked(found, rows, seen, progress)]
+    told = [moved for moved in asked if moved.chance * len(asked) < OVERWHELMING]
     told.sort(key=lambda moved: moved.chance)
     if slips and (not told or min(slip.chance for slip in slips) <= told[0].chance * len(asked)):
-        return [slip.notice for slip in slips]
+        return [_of_slip(slip, asked, seen) for slip in slips]
     if columns := [moved for moved in told if not moved.column.as_time]:
         return [_with_columns(columns)]
     return [_while_measured(told)] if told else []
@@ -174,6 +181,23 @@ def _moved(found: Calibration, seen: Whitened, column: Asked) -> Moved:
     chance, turned = seen.explained(by_joints * column.values[:, None, None])
     way = np.linalg.norm((by_joints @ turned)[:, :AXES], axis=1)
     return Moved(column, chance, float(MM_PER_METRE * column.reach * way.mean()))
+
+
+def _of_slip(slip: Slip, asked: Sequence[Moved], seen: Whitened) -> Notice:
+    """A step; of a joint with the columns that change there, which may be what moves it."""
+    visits = np.flatnonzero(seen.rows == slip.behind)
+    if slip.notice.kind != JOINT_MOVED or not len(visits):
+        return slip.notice
+    there = [moved for moved in asked if moved.column.changes_at(int(visits[0]))]
+    if not there:
+        return slip.notice
+    names = " and ".join(moved.column.name for moved in there)
+    change, it, which = ("change", "one of them", "NAME") if len(there) > 1 else ("changes", "it", names)
+    text = (
+        f"{slip.notice} But {names} {change} there as well: if {it} is what moves the joints, and {KNOWN}, "
+        f"calibrate with --features {which}{_to_fill(there)}."
+    )
+    return Notice(slip.notice.kind, text)
 
 
 def _with_columns(columns: list[Moved]) -> Notice:

@@ -29,7 +29,7 @@ from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Ou
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
 from truearm.doubts.slips import main_slips, slips
-from truearm.doubts.turned_later import turned_later
+from truearm.doubts.turned_later import turned_in_setups, turned_later
 from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
 from truearm.doubts.whitened import Whitened
@@ -155,7 +155,11 @@ def _doubted(
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
     if not (framed or too_large) and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
-            otherwise = fits_otherwise(task, data) or turned_later(task, data, BETTER, NEAR_M)
+            otherwise = (
+                turned_in_setups(task, data, BETTER, NEAR_M)
+                or fits_otherwise(task, data)
+                or turned_later(task, data, BETTER, NEAR_M)
+            )
         if otherwise:
             # What takes parameters far from nominal is known then, and is no other robot.
             doubted = [notice for notice in doubted if notice.kind != FAR_FROM_NOMINAL]

@@ -58,17 +58,17 @@ class Derivatives:
 
     Attributes:
         setup: By the unknowns of the set-up, its frame first, if that is not known (n, W).
-        joints: By the joint values (n, N).
+        joints: By the joint readings (n, N).
         points: Which values are coordinates of points, x, y and z one after the other (n,).
         frame: How many unknowns its frame has.
-        targets: How many targets there are.
+        targets: Which targets of the rows are fitted, from 0.
     """
 
     setup: Floats
     joints: Floats
     points: Mask
     frame: int
-    targets: int
+    targets: tuple[int, ...]
 
     @property
     def columns(self) -> Floats:
@@ -78,17 +78,28 @@ class Derivatives:
         return np.hstack([shift, self.setup, self.joints])
 
     def shapes(self) -> Iterator[Shape]:
-        """What of it may: all targets or one of them, one joint or all, the frame's turn."""
-        first, end = AXES + self.frame, AXES + self.setup.shape[1]
+        """What of it may: the frame's turn, all targets or one of them, one joint or all."""
         if self.frame == FRAME_UNKNOWNS:
-            yield Shape(FRAME, (), tuple(range(2 * AXES, first)))
-        yield Shape(TARGET, tuple(range(self.targets)), tuple(range(first, end)))
-        for target in range(self.targets if self.targets > 1 else 0):
-            own = first + AXES * target
-            yield Shape(TARGET, (target,), tuple(range(own, own + AXES)))
+            yield Shape(FRAME, (), tuple(range(2 * AXES, AXES + self.frame)))
+        yield from self._of_targets()
+        end = AXES + self.setup.shape[1]
         for joint in range(self.joints.shape[1]):
             yield Shape(JOINT, (joint,), (end + joint,))
         yield Shape(JOINT, tuple(range(self.joints.shape[1])), tuple(range(end, end + self.joints.shape[1])))
+
+    def _of_targets(self) -> Iterator[Shape]:
+        """Shifts of the targets that the set-up holds, three columns each, and the turn behind them."""
+        told = AXES + np.flatnonzero(self.setup.any(axis=0))
+        behind = AXES + self.frame + AXES * np.arange(len(self.targets) + 1)
+        own = [tuple(told[(told >= first) & (told < first + AXES)].tolist()) for first in behind]
+        shifts = {target: columns for target, columns in zip(self.targets, own[:-1], strict=True) if columns}
+        every, turn = tuple(column for columns in shifts.values() for column in columns), own[-1]
+        yield Shape(TARGET, tuple(shifts), every)
+        if turn:
+            yield Shape(TARGET, (), turn)
+            yield Shape(TARGET, tuple(shifts), (*every, *turn))
+        for target, columns in shifts.items() if len(shifts) > 1 else ():
+            yield Shape(TARGET, (target,), columns)
 
     def way_mm(self, step: Step) -> float:
         """How far a step moves points on average."""
@@ -141,11 +152,13 @@ class Slip:
         notice: What it is, and what to do.
         chance: How likely chance explains as much.
         share: Part of what is left that it explains.
+        behind: Place of the first row behind it; None where a whole set-up differs from others.
     """
 
     notice: Notice
     chance: float
     share: float
+    behind: int | None
 
 
 def slips(found: Calibration, fitted: FittedRows, seen: Whitened, progress: Floats) -> list[Slip]:
@@ -185,7 +198,8 @@ def slips_of(sessions: Sequence[Session]) -> list[Slip]:
     for step, session in sorted(found, key=lambda pair: -pair[0].gain):
         chance, kind = step.chance * len(sessions), KINDS[step.shape.what]
         if chance < OVERWHELMING and not (told and kind == JOINT_MOVED):
-            told.append(Slip(Notice(kind, _words(session, step)), chance, step.share))
+            behind = int(session.rows[step.place]) if step.place else None
+            told.append(Slip(Notice(kind, _words(session, step)), chance, step.share, behind))
     return told
 
 
@@ -213,9 +227,10 @@ def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterato
             seen.square,
             seen.freedom,
         )
-        setup, joints = (each[own].reshape(count, -1) for each in (seen.setup, seen.joints))
+        by_readings = seen.joints[own] @ found.robot.coupling
+        setup, joints = (each.reshape(count, -1) for each in (seen.setup[own], by_readings))
         points = np.ones(count, dtype=np.bool_)
-        by = Derivatives(setup, joints, points, frame, len(found.selection.targets))
+        by = Derivatives(setup, joints, points, frame, found.selection.targets)
         yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
 
 
@@ -228,9 +243,8 @@ def _words(session: Session, step: Step) -> str:
         return f"{where} {_of_target(session.by, step)}. {OWN_GROUP}"
     far = length_mm(session.by.way_mm(step), DIGITS)
     if step.shape.what == FRAME:
-        turn = float(MRAD_PER_RAD * np.linalg.norm(step.sizes))
         return (
-            f"{where} the measuring device, or the arm's base, turned by {turn:.{DIGITS}g} mrad (points by "
+            f"{where} the measuring device, or the arm's base, turned by {_mrad(step.sizes)} (points by "
             f"{far} on average). {OWN_GROUP}"
         )
     what, way_out = _of_joints(session, step)
@@ -238,17 +252,27 @@ def _words(session: Session, step: Step) -> str:
 
 
 def _of_target(by: Derivatives, step: Step) -> str:
-    """Which targets slipped, and how far."""
+    """Which targets slipped, or turned, and how far."""
     numbers = step.shape.numbers
-    by_mm = MM_PER_METRE * step.sizes[: AXES * len(numbers)].reshape(-1, AXES)
+    shifts, turn = np.split(step.sizes, [AXES * len(numbers)])
+    if not numbers:
+        return f"the target turned on the tool by {_mrad(turn)}, about itself"
+    by_mm = MM_PER_METRE * shifts.reshape(-1, AXES)
     how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
     if len(numbers) > 1:
         return f"the targets slipped on the tool, or were put elsewhere on it, {how}"
     axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
-    what = "the target" if by.targets == 1 else f"target {numbers[0] + 1}"
+    what = "the target" if len(by.targets) == 1 else f"target {numbers[0] + 1}"
+    turned = f", and turned by {_mrad(turn)}" if len(turn) else ""
     return (
         f"{what} slipped on the tool, or was put elsewhere on it, {how} (along the flange's axes {axes} mm)"
+        f"{turned}"
     )
+
+
+def _mrad(turn: Floats) -> str:
+    """The size of a turn (3,), rad, in words."""
+    return f"{float(f'{MRAD_PER_RAD * np.linalg.norm(turn):.{DIGITS}g}'):g} mrad"
 
 
 def _of_joints(session: Session, step: Step) -> tuple[str, str]:
@@ -261,7 +285,7 @@ def _of_joints(session: Session, step: Step) -> tuple[str, str]:
         moved = f"joints moved against their readings ({each})"
     if numbers == (0,) and by.frame:
         return f"{moved}, or the measuring device about the same axis", OWN_GROUP
-    if numbers == (len(joints) - 1,) and by.targets == 1:
+    if numbers == (len(joints) - 1,) and len(by.targets) == 1:
         return f"{moved}, or the tool about the same axis", OWN_GROUP
     return f"{moved}, as where one slips or is mastered anew", ONE_PART
 

@@ -113,7 +113,8 @@ class Whitened:
         shots: How many shots of the visit hold it (v, m); zero where not measured.
         root: R^(-1/2) of each visit (v, m, m).
         taken: T (v m, v m).
-        joints: Derivatives (v, m, N) by the joint values, base frame; zero where not measured.
+        joints: Derivatives (v, m, N) by the joint values, not their readings, base frame; zero where not
+            measured.
         single: Variance (v, m) of a single shot, m^2.
         setup: Derivatives (v, m, W) by the unknowns of the own set-up, base frame; zero where not measured.
     """

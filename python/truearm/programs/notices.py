@@ -102,13 +102,17 @@ def _unasked(program: Program, frames: Frames, kind: Kind) -> Notice | None:
 
 
 def update_notices(calibration: Calibration) -> list[Notice]:
-    """A warning where an update found that the calibration no longer fits its arm."""
+    """A warning where an update found that the calibration no longer fits its arm, or something slipped
+    while its rows were measured.
+    """
     revision = calibration.revision
-    if revision is None or revision.report["verdict"] != "field":
+    if revision is None:
         return []
     if any(notice.kind in STEP_KINDS for notice in calibration.notices):
         text = f"What the update that this calibration is of was measured with changed meanwhile. {MEANWHILE}"
         return [Notice("update", text)]
+    if revision.report["verdict"] != "field":
+        return []
     text = (
         "The update that this calibration is of found that it no longer fits the arm: what it says of its "
         "standard deviation does not hold, and corrections may miss. Measure again and calibrate."

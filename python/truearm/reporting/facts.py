@@ -53,7 +53,9 @@ class Facts:
 
     @property
     def held(self) -> HeldRows | None:
-        """The held-out rows with their errors, of points; None without, and where distances were measured."""
+        """The held-out rows with errors that belong to their poses; None without, and where distances, which
+        two poses have, were measured.
+        """
         return None if self.calibration.selection.distances else self.calibration.held
 
     @property
@@ -122,10 +124,11 @@ class Facts:
 
     @cached_property
     def errors_mm(self) -> Mapping[str, Floats]:
-        """Lengths of the held-out position errors of each model (n,), mm, NaN where not measured."""
-        if self.held is None:
+        """Lengths of the held-out errors of each model (n,), mm, NaN where not measured."""
+        known = self.calibration.held
+        if known is None:
             return {}
-        return {name: MM_PER_METRE * found.distance_m for name, found in self.held.errors.items()}
+        return {name: MM_PER_METRE * found.distance_m for name, found in known.errors.items()}
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -169,18 +172,19 @@ class Facts:
         return "mean error without the outliers" if self.leaves_outliers_out else "mean error"
 
     def mean_mm(self, model: str | None = None) -> float:
-        """Mean held-out position error of a model, the best by default, mm; outliers are no part of it."""
+        """Mean held-out error of a model, the best by default, mm; outliers are no part of it."""
         name = model or self.best
-        if self.held is None:
+        if self.calibration.held is None:
             return judged_means_mm(self.calibration.validation, self.outliers)[name]
         return float(np.nanmean(self.kept_errors_mm(name)))
 
     def kept_errors_mm(self, model: str) -> Floats:
         """Lengths of held-out errors of a model (k,), mm, without outliers; none where rows are not known."""
-        if self.held is None:
+        known = self.calibration.held
+        if known is None:
             return np.empty(0)
         found = self.errors_mm[model]
-        kept = found[self.held.without(self.summary["outliers"])]
+        kept = found[known.without(self.summary["outliers"])]
         return kept if np.isfinite(kept).any() else found
 
     @property

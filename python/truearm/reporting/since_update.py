@@ -9,7 +9,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.update_words import (
-    MEANWHILE,
+    CHANGED_MEANWHILE,
     follows_words,
     motion_name,
     of_known_world,
@@ -39,13 +39,12 @@ def since_update(facts: Facts) -> Section:
 
 
 def _overall(facts: Facts, told: Mapping[str, Any]) -> str:
-    words = VERDICTS[told["verdict"]].format(
+    verdicts = CHANGED_MEANWHILE if facts.changed_meanwhile else VERDICTS
+    words = verdicts[told["verdict"]].format(
         tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
     left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
-    if told["verdict"] == "field" and facts.changed_meanwhile:
-        words = f"{listed(told['estimated']).capitalize()} do not explain what was measured. {MEANWHILE}"
-    elif told["verdict"] == "field" and (base := of_known_world(told)):
+    if told["verdict"] == "field" and not facts.changed_meanwhile and (base := of_known_world(told)):
         words = f"{words} {base}"
     if untested := untested_joints(told):
         words = f"{words} {untested}"

@@ -42,7 +42,7 @@ def _sessions(scene: Scene, found: Estimate) -> Iterator[Session]:
             linear.jacobian[values, : task.arm.robot.joint_count],
             is_point[values],
             frame,
-            len(task.selection.targets),
+            task.selection.targets,
         )
         several = len(task.groups) > 1
         yield Session(task.arm.robot, scene.data, linear.pose[values[first]], left, by, several)
