@@ -4,30 +4,16 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.xyzc import xyzc
 from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.whitened import Whitened
 from truearm.simulation import VirtualArm
 
 ROWS = 60
-PLANE = [("prismatic", 0.0, 0.0, -90.0), ("prismatic", -90.0, 0.0, -90.0), ("prismatic", 0.0, 0.0, 0.0)]
-XYZC = "\n".join(
-    f'[[link]]\njoint = "{joint}"\ntheta = {theta}\nd = {d}\na = 0.0\nalpha = {alpha}\nlimits = {limits}'
-    for (joint, theta, d, alpha), limits in zip(
-        [*PLANE, ("revolute", 0.0, 100.0, 0.0)],
-        ([0.0, 3000.0], [0.0, 1800.0], [0.0, 1200.0], [-170.0, 170.0]),
-        strict=True,
-    )
-)
 
 
 def scara(_):
     return ta.Robot.load("adept-cobra-600")
-
-
-def gantry(path):
-    file = path / "xyzc.toml"
-    file.write_text('name = "xyzc"\nconvention = "standard"\nlength_unit = "mm"\nangle_unit = "deg"\n' + XYZC)
-    return ta.Robot.load(file)
 
 
 def held(_):
@@ -43,7 +29,7 @@ def poses_of(arm, seed):
     return readings
 
 
-@pytest.mark.parametrize("robot", [scara, gantry, held])
+@pytest.mark.parametrize("robot", [scara, xyzc, held])
 def test_no_more_is_taken_of_rows_than_there_is_of_them(robot, tmp_path):
     """Where rows leave frame and target open, the posterior is as wide as its prior."""
     arm = VirtualArm(robot(tmp_path), seed=1)
