@@ -11,6 +11,7 @@ import pytest
 import truearm as ta
 from tests.cell_support import cell_text
 from tests.stages import Stages
+from tests.xyzc import xyzc
 from truearm.cell import Cell
 from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
@@ -220,6 +221,17 @@ def test_poses_are_proposed_from_a_calibration(asked, purpose, said, calib, here
         assert expected == sorted(expected, reverse=True)
     else:
         assert set(found["noticed"]) >= {"joint2", "joint3"}
+
+
+def test_where_no_number_of_poses_tells_of_a_change_it_is_said_so(here, capsys):
+    """What moves of axes X, Y, Z and C is another frame or target."""
+    arm = VirtualArm(xyzc(here), seed=1)
+    ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant", refit=False).save("arm.calib")
+    assert main(["plan", "--acceptance", "12", "--from", "arm.calib", "-o", "a.csv"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "So few poses" not in told
+    assert "No number of poses tells here whether a joint moved against its reading" in told
+    assert "--keep-frame and --keep-tool tells it" in told
 
 
 def test_progress_is_told_while_poses_are_proposed(calib, here, monkeypatch):

@@ -356,6 +356,16 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"delimiter": ";"},
         'holds "1,234.5". A number has one mark.*without marks between thousands',
     ),
+    "a list in a cell": (
+        PLAIN.replace(",", ";").replace("1000", "[1.2, -0.4]"),
+        {"delimiter": ";"},
+        r'"px" holds "\[1.2, -0.4\]". A cell holds one number, not a list. .* a column for each number.$',
+    ),
+    "a list of decimal commas": (
+        PLAIN.replace(",", ";").replace("1000", "[1,2 -0,4]"),
+        {"delimiter": ";", "decimal": ","},
+        "A cell holds one number, not a list",
+    ),
     "points with decimal commas": (
         PLAIN.replace(",", ";").replace("1000", "1,234.5"),
         {"delimiter": ";", "decimal": ","},

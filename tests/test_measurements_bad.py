@@ -132,7 +132,10 @@ CONTENTS = {
     "empty": (b"", "the file is empty"),
     "blank": (b"\n \n", "the file is empty"),
     "workbook": (b"PK\x03\x04....", "this is a ZIP archive, such as an Excel workbook"),
-    "calibration": (b"\x10\x00\x00\x00\x00\x00\x00\x00{}", "binary data"),
+    "calibration": (
+        b"\x10\x00\x00\x00\x00\x00\x00\x00{}",
+        "binary data, not text. Export it as text, a table as CSV",
+    ),
     "web page": (b"<!DOCTYPE html><html>", "an HTML page, not CSV"),
     "URDF": (b"<?xml version='1.0'?><robot/>", "XML, not CSV"),
     "JSON": (b'{"q1": 0}', "JSON, not CSV"),

@@ -112,7 +112,9 @@ def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8"
         unmarked = "" if encoding == "utf-16" else ", without a byte order mark"
         raise InputError(f"this is UTF-16 text{unmarked}", where=where, way_out=way_out)
     if b"\x00" in content:
-        raise InputError("this is binary data, not text", where=where)
+        raise InputError(
+            "this is binary data, not text", where=where, way_out="Export it as text, a table as CSV"
+        )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

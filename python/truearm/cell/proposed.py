@@ -114,7 +114,11 @@ class Proposed:
                 "expected_before_mm": float(expected[0]),
                 "expected_after_mm": expected[1:].tolist(),
             }
-        return told | {"noticed": self.found.noticed, "information_nat": self.found.information[1:].tolist()}
+        return told | {
+            "noticed": self.found.noticed,
+            "alike": self.found.alike,
+            "information_nat": self.found.information[1:].tolist(),
+        }
 
 
 def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Cell | None = None) -> Proposed:

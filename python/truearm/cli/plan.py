@@ -36,6 +36,15 @@ WORSE: Final = (
     "Such an update is expected to leave no less uncertain than {file} is: it may find less than the updates "
     "before did. Keep that, or calibrate anew."
 )
+GOOD_NUMBER: Final = 10
+"""Poses from which few are no reason why they tell of no change."""
+FEW: Final = "So few poses tell of no change: 10 to 20 are a good number."
+MORE: Final = "These poses tell of no change: with this noise it takes more of them."
+ALIKE: Final = (
+    "No number of poses tells here whether a joint moved against its reading: that looks like another place "
+    "of the device, or of the target on the flange. Where the device stands where it stood, and the target "
+    "sits where it sat, update with --keep-frame and --keep-tool tells it."
+)
 PICTURES: Final = (".png", ".svg", ".pdf")
 
 
@@ -303,7 +312,7 @@ def _print_proposed(
         )
         return
     if not told["noticed"]:
-        say("So few poses tell of no change: 10 to 20 are a good number.")
+        say_wrapped(ALIKE if told["alike"] else FEW if told["count"] < GOOD_NUMBER else MORE)
         return
     say_wrapped(f"Smallest change that is noticed in 95 of 100 cases ({told['measured']}):")
     rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]

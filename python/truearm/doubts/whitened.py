@@ -17,6 +17,7 @@ from truearm.fits.core_set import Selection, core_set
 from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.measured_parts import held_parts
+from truearm.fits.models import CONSTANT
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rows.shots import Scatter
@@ -230,10 +231,13 @@ def _derivatives(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Inputs (v, I) of rows, and derivatives of what they hold (v, m, ...) of some targets by the arm's
     parameters, by the unknowns of all set-ups, and by the joint values.
+
+    They are taken where the posterior is linearised, at the constants: along what rows leave open, it is as
+    wide as its prior, and derivatives from elsewhere, that turn into it ever so little, make that count.
     """
-    task, setup = task_of(found), found.model.setup
-    inputs = model_inputs(task.arm, data, task.options.features)
-    parameters = np.ascontiguousarray(found.model.parameters(inputs))
+    task, point = task_of(found), found.models[CONSTANT]
+    inputs, setup = model_inputs(task.arm, data, task.options.features), point.setup
+    parameters = np.ascontiguousarray(point.parameters(inputs))
     joints = np.ascontiguousarray(inputs[:, : task.arm.robot.joint_count])
     problem = task.problem(core_set(task.arm.robot, data, task.selection, task.groups), [])
     own = setup_jacobian(problem, parameters, setup)[:, _columns(targets)]

@@ -28,6 +28,8 @@ NOTICED: Final = 0.95
 """Share of the cases in which a change is to be noticed."""
 TOLD: Final = 0.5
 """A change is told where the rows leave less than this share of its prior's deviation."""
+MANY: Final = 100
+"""Poses of which more tell of no further change, only of smaller ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +42,14 @@ class Acceptance:
         noticed: The smallest change that is noticed in 95 of 100 cases: of each joint's offset in deg or mm
             ("joint1" ...), and of the target on the tool in mm ("tool"). A joint that cannot be told from the
             frame or the tool is not named.
+        alike: Whether nothing is noticed however many poses there are: offsets of the joints, and the target
+            in some direction, look like another frame or target.
     """
 
     rows: NDArray[np.int64]
     information: Floats
     noticed: dict[str, float]
+    alike: bool = False
 
 
 def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions | None = None) -> Acceptance:
@@ -72,12 +77,14 @@ def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions 
     core = candidates.core(apart)
     rows, values = choose_telling(unchanged + flat @ flat.T, unchanged, core, count)
     picked = np.array(rows, dtype=np.int64)
-    told = _told(candidates, unchanged, columns, picked)
-    # An update keeps what the poses do not tell as it was; what else they tell of is then told better.
-    is_joint = np.array([name.startswith("joint") for name in names])
-    free = ~is_joint | (told < TOLD)
-    told[free] = _told(candidates, unchanged, columns[:, :, free], picked)
-    return Acceptance(picked, np.array(values), _noticed(candidates.calibration, chosen, names, told))
+
+    def noticed(places: NDArray[np.int64]) -> dict[str, float]:
+        told = _told_at_last(candidates, unchanged, columns, names, places)
+        return _noticed(candidates.calibration, chosen, names, told)
+
+    found = noticed(picked)
+    alike = not found and not noticed(fill(candidates.points, MANY))
+    return Acceptance(picked, np.array(values), found, alike)
 
 
 def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, list[str]]:
@@ -97,6 +104,22 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     frame = [] if arm.world_is_known else ["frame"] * 6
     tool = ["tool"] * (setup.shape[2] - len(frame))
     return whole, [*names[:joints], *names[joints:], *frame, *tool, *(f"payload{k + 1}" for k in turning)]
+
+
+def _told_at_last(
+    candidates: Candidates,
+    unchanged: Floats,
+    columns: Floats,
+    names: Sequence[str],
+    rows: NDArray[np.int64],
+) -> Floats:
+    """As `_told`, by an update that keeps offsets which the rows do not tell as they were."""
+    told = _told(candidates, unchanged, columns, rows)
+    # What else they tell of is told better then.
+    is_joint = np.array([name.startswith("joint") for name in names])
+    free = ~is_joint | (told < TOLD)
+    told[free] = _told(candidates, unchanged, columns[:, :, free], rows)
+    return told
 
 
 def _told(candidates: Candidates, unchanged: Floats, columns: Floats, rows: NDArray[np.int64]) -> Floats:

@@ -39,6 +39,7 @@ UNNAMED: Final = "-"
 BLANKS: Final = re.compile(r"[ \t]+")
 NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
+BRACKETS: Final = ("[", "(", "{")
 BYTE_ORDER_MARK: Final = "\ufeff"
 SHOWN: Final = 60
 """Characters of a line that are shown in a message."""
@@ -125,14 +126,14 @@ class Part(NamedTuple):
         Raises:
             InputError: If a cell of the file is no number; names the file and its row.
         """
-        if self.marks.decimal == ",":
-            pointed = _with_points(self.table, self.name, self.marks.options)
-            return pointed.numbers(self.name)[self.rows]
         try:
+            if self.marks.decimal == ",":
+                pointed = _with_points(self.table, self.name, self.marks.options)
+                return pointed.numbers(self.name)[self.rows]
             return self.table.numbers(self.name)[self.rows]
         except InputError as error:
             hint = None if self.marks.decimal else _hint(self.table, self.name, self.marks.options)
-            raise (hint or error) from None
+            raise (_of_list(self.table, self.name) or hint or error) from None
 
 
 @dataclass(frozen=True)
@@ -288,6 +289,19 @@ def _with_points(table: Table, name: str, options: str) -> Table:
         )
     column = np.array([cell.replace(",", ".") for cell in cells], dtype=np.object_)
     return Table(table.where, {name: column}, table.row_count)
+
+
+def _of_list(table: Table, name: str) -> InputError | None:
+    """What is said of a column whose cells hold several numbers in brackets; None of others."""
+    lists = [cell for cell in table.cells(name) if cell.lstrip().startswith(BRACKETS)]
+    if not lists:
+        return None
+    return InputError(
+        f'column "{name}" holds "{lists[0][:SHOWN]}"',
+        where=table.where,
+        rule="A cell holds one number, not a list",
+        way_out="Export the table with a column for each number",
+    )
 
 
 def _hint(table: Table, name: str, options: str) -> UsageError | None:
