@@ -33,6 +33,8 @@ Mask = NDArray[np.bool_]
 
 AT_ONCE: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""
+FINEST: Final = 1e-8
+"""No device tells points or turns of an arm more finely, m and rad."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
 """Of the base, and of the tool's place."""
 
@@ -191,12 +193,18 @@ class ConstantSpread:
         left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
         return np.asarray(left @ self.of_all[:size, :size] @ right.T)
 
+    @property
+    def _shared(self) -> float:
+        """Covariance of two targets of one pose along the same axis, m^2: each has a part of its own."""
+        whole = self.noises[0] ** 2
+        return min(self.common * whole, max(whole - FINEST**2, 0.0))
+
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """What no constant explains, alike everywhere; targets of one pose have part of it in common."""
         noise = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
         targets = int((~orientation).sum()) // AXES
         together = np.kron(np.ones((targets, targets)) - np.eye(targets), np.eye(AXES))
-        noise[: len(together), : len(together)] += self.common * self.noises[0] ** 2 * together
+        noise[: len(together), : len(together)] += self._shared * together
         return np.repeat(noise[None], len(jacobian), axis=0)
 
 
