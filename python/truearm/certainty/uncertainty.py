@@ -100,7 +100,7 @@ class SetupPlace:
 
     @classmethod
     def at(cls, calibration: "Calibration", end: Endpoint) -> "SetupPlace | None":
-        """Of the set-up whose world, and of the target that is the end; None where it is in the base frame."""
+        """Of the set-up in whose world the end is, as its target if it is one; None in the base frame."""
         if end.group is None:
             return None
         motion = _motion(task_of(calibration), calibration.measured, end.group, end.target)
