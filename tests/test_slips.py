@@ -11,6 +11,7 @@ from truearm.doubts.at_once import (
     JOINT,
     JOINT_MOVED,
     SETUP_TURNED,
+    TARGET,
     TARGET_SLIPPED,
     Left,
     Shape,
@@ -155,3 +156,41 @@ def test_a_step_is_found_at_its_place_beside_another_with_its_size():
     assert (found.shape.numbers, found.place) == ((1,), 17)
     assert found.sizes == pytest.approx([3.0], abs=0.5)
     assert found.chance < 1e-20
+
+
+def noise_of_targets(rng, visits, targets):
+    """Visits to poses where targets are off alike by ten times what each is off by itself, nothing fitted but
+    the columns' level and 12 unknowns; and derivatives by a shift of each target in the flange's frame.
+    """
+    size = 3 * targets
+    own = np.eye(size) + 100.0 * np.kron(np.ones((targets, targets)), np.eye(3))
+    root = np.kron(np.eye(visits), np.linalg.cholesky(np.linalg.inv(own)).T)
+    turned = matrix_from_rotation_vector(rng.normal(size=(visits, 3)))
+    columns = np.einsum("kl,vij->vkilj", np.eye(targets), turned).reshape(visits * size, size)
+    fitted, _ = np.linalg.qr(root @ np.hstack([columns, rng.normal(size=(visits * size, 12))]))
+    taken = np.eye(visits * size) - fitted @ fitted.T
+    visit = np.repeat(np.arange(visits), size)
+
+    def left(step):
+        off = taken @ (rng.normal(size=visits * size) + root @ (columns * (visit >= 17)[:, None]) @ step)
+        square, freedom = float(off @ off), float(np.trace(taken))
+        return Left(root.T @ off, root.T @ taken @ root, root.T @ root, visit, square, freedom)
+
+    return left, columns
+
+
+@pytest.mark.parametrize("targets", [2, 3])
+def test_a_tool_that_slips_with_its_targets_is_found(targets):
+    """All of them move alike, by what each is known to from its differences to the others and not as well."""
+    left, columns = noise_of_targets(np.random.default_rng(2), 40, targets)
+    each = [Shape(TARGET, (k,), tuple(range(3 * k, 3 * k + 3))) for k in range(targets)]
+    shapes = [Shape(TARGET, tuple(range(targets)), tuple(range(3 * targets))), *each]
+    found = likeliest_step(left(np.tile([30.0, -30.0, 30.0], targets)), columns, shapes)
+    assert found is not None
+    assert (found.shape, found.place) == (shapes[0], 17)
+    assert found.chance < 1e-4
+    sizes = found.sizes.reshape(targets, 3)
+    np.testing.assert_allclose(sizes, np.tile(sizes[0], (targets, 1)))
+    assert np.linalg.norm(sizes[0]) == pytest.approx(30.0 * np.sqrt(3.0), rel=0.2)
+    still = likeliest_step(left(np.zeros(3 * targets)), columns, shapes)
+    assert still is None or still.chance > 1e-3
