@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -18,6 +19,7 @@ from truearm.doubts.at_once import (
     likeliest_step,
 )
 from truearm.doubts.moved_joints import JOINTS_MOVED
+from truearm.doubts.tool_slips import tool_slips
 from truearm.fleet.doubted import grave_notices
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
@@ -194,3 +196,24 @@ def test_a_tool_that_slips_with_its_targets_is_found(targets):
     assert np.linalg.norm(sizes[0]) == pytest.approx(30.0 * np.sqrt(3.0), rel=0.2)
     still = likeliest_step(left(np.zeros(3 * targets)), columns, shapes)
     assert still is None or still.chance > 1e-3
+
+
+@pytest.mark.parametrize("slip_mm", [0.0, 1.0])
+def test_a_tool_that_slips_is_told_by_the_middle_of_its_targets(slip_mm):
+    """Constants leave more than the slip at each pose, and what varies would follow it."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=2, imperfections=Imperfections(share=0.2, noise_mm=0.01))
+    q, table = arm.poses(60, seed=7), {}
+    table |= {f"q{joint + 1}": q[:, joint] for joint in range(6)}
+    for number, target_mm in enumerate(([30.0, 20.0, 50.0], [-60.0, 10.0, 80.0], [20.0, -70.0, 20.0])):
+        arm.target_in_flange = 1e-3 * np.array(target_mm)
+        points = arm.measure_table(q, seed=1)[["x", "y", "z"]].to_numpy()
+        slip = arm.true_pose(q)[:, :3, :3] @ np.array([0.6e-3, 0.0, 0.8e-3]) @ arm.world_from_base[:3, :3].T
+        points = points + slip_mm * slip * (np.arange(60) >= 30)[:, None]
+        points += 1e-5 * np.random.default_rng(number).normal(size=points.shape)
+        table |= {f"{axis}{number + 1 if number else ''}": points[:, k] for k, axis in enumerate("xyz")}
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(pd.DataFrame(table)), model="constant")
+    told = [str(slip.notice) for slip in tool_slips(found, found.rows, np.linspace(0.0, 1.0, 60))]
+    assert len(told) == (slip_mm > 0.0)
+    for said in told:
+        assert said.startswith("Between row 30 and row 31 the targets slipped on the tool")
+        assert float(said.split("elsewhere on it, by ")[1].split(" mm")[0]) == pytest.approx(1.0, rel=0.25)
