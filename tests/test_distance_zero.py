@@ -48,6 +48,22 @@ def test_lengths_that_differ_are_told_each_and_do_not_bend_one_another():
         assert abs(length - true) < 3.0 * error < 6.0
 
 
+def test_a_coarse_wire_that_says_so_hides_no_zero_of_a_fine_one():
+    """Sixty poses, three wires at each: what the third misses is no doubt of the first."""
+    arm, sigma_mm = VirtualArm(ta.Robot.load("ur5e"), seed=3), np.array([0.05, 0.05, 1.0])
+    table = arm.measure_table(arm.poses(60))
+    points = (table[["x", "y", "z"]] - table[["x", "y", "z"]].mean()).to_numpy()
+    anchors = ANCHOR * np.array([[1, 1, 1], [-1, 1, 2], [1, -1, 3]])
+    noise = sigma_mm * np.random.default_rng(1).normal(size=(60, 3))
+    away = np.linalg.norm(points[:, None] - anchors, axis=2) + 1e-3 * (noise + np.eye(3)[0])
+    rows = table[[f"q{k}" for k in range(1, 7)]].loc[np.repeat(np.arange(60), 3)]
+    columns = {"anchor": np.tile(["a", "b", "c"], 60), "sigma_mm": np.tile(sigma_mm, 60)}
+    data = ta.Measurements.from_dataframe(rows.assign(distance=away.ravel(), **columns))
+    ((anchor, length, error),) = lengths_told(data)
+    assert anchor == '"a"'
+    assert abs(length - 1.0) < 3.0 * error < 0.6
+
+
 def wire(length_m, count=80, seed=5):
     """Distances to one fixed point that are `length_m` longer than they are."""
     arm = VirtualArm(ta.Robot.load("ur5e"), seed=seed)

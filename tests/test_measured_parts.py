@@ -149,6 +149,35 @@ def test_files_that_do_not_say_what_was_measured_are_read(by_set_up, tmp_path):
         ta.Calibration.load(tmp_path / "odd.calib")
 
 
+def test_standard_deviations_in_a_world_are_of_its_set_up():
+    """Twelve rows of a camera beside forty of a tracker: their world is as far off as it says."""
+    off, std = [], []
+    for seed in range(4):
+        arm = VirtualArm(UR10, seed=seed, imperfections=Imperfections(share=0.0, noise_mm=0.0))
+        table = arm.measure_table(arm.poses(52)).assign(sigma_mm=0.3, group="camera")
+        table.loc[12:, ["sigma_mm", "group"]] = 0.03, "tracker"
+        noise_m = 1e-3 * table["sigma_mm"].to_numpy()[:, None]
+        table[["x", "y", "z"]] += noise_m * np.random.default_rng(seed).normal(size=(52, 3))
+        found, q, mounted = constants(table), arm.poses(30, seed=9), np.eye(4)
+        mounted[:3, 3] = arm.target_in_flange
+        true = (arm.world_from_base @ arm.true_pose(q, tool=mounted))[:, :3, 3]
+        off.append(found.position(q, group="camera", target=1) - true)
+        std.append(found.position_std(q, group="camera", target=1))
+        assert (found.position_std(q, group="tracker", target=1) < 0.5 * std[-1]).all()
+        of_point = found.position_std(q, group="camera", tool=found.model.setup.targets[0, 0])
+        assert of_point == pytest.approx(std[-1])
+    assert 0.6 < np.sqrt(np.square(np.divide(off, std)).mean()) < 1.5
+
+
+def test_standard_deviations_of_a_target_are_its_own(arm, table):
+    """A target of few rows beside one of many is known less well."""
+    few = table.drop(columns=QUATERNION)
+    few.loc[3:, SECOND] = np.nan
+    found, q = constants(few), arm.poses(20, seed=4)
+    first, second = (found.position_std(q, group="data", target=number) for number in (1, 2))
+    assert (second > 1.5 * first).all()
+
+
 def test_targets_that_a_set_up_did_not_measure_are_no_answer(arm, by_set_up):
     q = arm.poses(5, seed=4)
     off = by_set_up.position(q, group="A", target=2) - second_in_world(arm, q)

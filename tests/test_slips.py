@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -13,12 +14,14 @@ from truearm.doubts.at_once import (
     JOINT_MOVED,
     SETUP_TURNED,
     STEP_KINDS,
+    TARGET,
     TARGET_SLIPPED,
     Left,
     Shape,
     likeliest_step,
 )
 from truearm.doubts.moved_joints import JOINTS_MOVED
+from truearm.doubts.tool_slips import tool_slips
 from truearm.fleet.doubted import grave_notices
 from truearm.programs.notices import update_notices
 from truearm.reporting.advice import advise
@@ -226,3 +229,62 @@ def test_a_step_is_found_at_its_place_beside_another_with_its_size():
     assert (found.shape.numbers, found.place) == ((1,), 17)
     assert found.sizes == pytest.approx([3.0], abs=0.5)
     assert found.chance < 1e-20
+
+
+def noise_of_targets(rng, visits, targets):
+    """Visits to poses where targets are off alike by ten times what each is off by itself, nothing fitted but
+    the columns' level and 12 unknowns; and derivatives by a shift of each target in the flange's frame.
+    """
+    size = 3 * targets
+    own = np.eye(size) + 100.0 * np.kron(np.ones((targets, targets)), np.eye(3))
+    root = np.kron(np.eye(visits), np.linalg.cholesky(np.linalg.inv(own)).T)
+    turned = matrix_from_rotation_vector(rng.normal(size=(visits, 3)))
+    columns = np.einsum("kl,vij->vkilj", np.eye(targets), turned).reshape(visits * size, size)
+    fitted, _ = np.linalg.qr(root @ np.hstack([columns, rng.normal(size=(visits * size, 12))]))
+    taken = np.eye(visits * size) - fitted @ fitted.T
+    visit = np.repeat(np.arange(visits), size)
+
+    def left(step):
+        off = taken @ (rng.normal(size=visits * size) + root @ (columns * (visit >= 17)[:, None]) @ step)
+        square, freedom = float(off @ off), float(np.trace(taken))
+        return Left(root.T @ off, root.T @ taken @ root, root.T @ root, visit, square, freedom)
+
+    return left, columns
+
+
+@pytest.mark.parametrize("targets", [2, 3])
+def test_a_tool_that_slips_with_its_targets_is_found(targets):
+    """All of them move alike, by what each is known to from its differences to the others and not as well."""
+    left, columns = noise_of_targets(np.random.default_rng(2), 40, targets)
+    each = [Shape(TARGET, (k,), tuple(range(3 * k, 3 * k + 3))) for k in range(targets)]
+    shapes = [Shape(TARGET, tuple(range(targets)), tuple(range(3 * targets))), *each]
+    found = likeliest_step(left(np.tile([30.0, -30.0, 30.0], targets)), columns, shapes)
+    assert found is not None
+    assert (found.shape, found.place) == (shapes[0], 17)
+    assert found.chance < 1e-4
+    sizes = found.sizes.reshape(targets, 3)
+    np.testing.assert_allclose(sizes, np.tile(sizes[0], (targets, 1)))
+    assert np.linalg.norm(sizes[0]) == pytest.approx(30.0 * np.sqrt(3.0), rel=0.2)
+    still = likeliest_step(left(np.zeros(3 * targets)), columns, shapes)
+    assert still is None or still.chance > 1e-3
+
+
+@pytest.mark.parametrize("slip_mm", [0.0, 1.0])
+def test_a_tool_that_slips_is_told_by_the_middle_of_its_targets(slip_mm):
+    """Constants leave more than the slip at each pose, and what varies would follow it."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=2, imperfections=Imperfections(share=0.2, noise_mm=0.01))
+    q, table = arm.poses(60, seed=7), {}
+    table |= {f"q{joint + 1}": q[:, joint] for joint in range(6)}
+    for number, target_mm in enumerate(([30.0, 20.0, 50.0], [-60.0, 10.0, 80.0], [20.0, -70.0, 20.0])):
+        arm.target_in_flange = 1e-3 * np.array(target_mm)
+        points = arm.measure_table(q, seed=1)[["x", "y", "z"]].to_numpy()
+        slip = arm.true_pose(q)[:, :3, :3] @ np.array([0.6e-3, 0.0, 0.8e-3]) @ arm.world_from_base[:3, :3].T
+        points = points + slip_mm * slip * (np.arange(60) >= 30)[:, None]
+        points += 1e-5 * np.random.default_rng(number).normal(size=points.shape)
+        table |= {f"{axis}{number + 1 if number else ''}": points[:, k] for k, axis in enumerate("xyz")}
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(pd.DataFrame(table)), model="constant")
+    told = [str(slip.notice) for slip in tool_slips(found, found.rows, found.rows.data.rows / 60.0)]
+    assert len(told) == (slip_mm > 0.0)
+    for said in told:
+        assert said.startswith("Between row 30 and row 31 the targets slipped on the tool")
+        assert float(said.split("elsewhere on it, by ")[1].split(" mm")[0]) == pytest.approx(1.0, rel=0.25)

@@ -126,6 +126,30 @@ def test_the_rows_of_a_pair_stay_on_one_side():
     assert not set(split.train // 2) & set(split.holdout // 2)
 
 
+def test_a_chain_of_pairs_is_parted_and_loses_few_of_them():
+    """Ninety-six poses, each measured to the one before and to the next."""
+    poses, links = table(96), np.repeat(np.arange(95), 2)
+    frame = poses.iloc[links + np.arange(190) % 2].drop(columns=["x", "y", "z"])
+    frame = frame.assign(pair=[f"p{link}" for link in links], distance=1.0)
+    split = split_rows(Measurements.from_dataframe(frame), SplitRule())
+    train, held = set(links[split.train]), set(links[split.holdout])
+    assert not train & held
+    assert len(split.train) == 2 * len(train)
+    assert len(split.holdout) == 2 * len(held)
+    assert 15 <= len(held) <= 40
+    assert len(train) + len(held) >= 80
+    poses_of = [set((links + np.arange(190) % 2)[rows]) for rows in (split.train, split.holdout)]
+    assert not poses_of[0] & poses_of[1]
+
+
+def test_pairs_with_one_row_that_all_share_are_said_to_leave_nothing_to_hold_out():
+    frame = table(60).assign(pair=np.repeat([f"p{k}" for k in range(30)], 2), distance=1.0)
+    joints = [f"q{k}" for k in (1, 2, 3)]
+    frame.loc[frame.index[::2], joints] = frame.loc[frame.index[0], joints].to_numpy()
+    with pytest.raises(InputError, match="two rows of a pair are on one side"):
+        split_rows(Measurements.from_dataframe(frame.drop(columns=["x", "y", "z"])), SplitRule(seed=1))
+
+
 @pytest.mark.parametrize(
     "text", ["q2", "q2:high", "q2:up:0.3", "2:high:0.3", "q0:high:0.3", "q2:high:much", "q2:high:1.5"]
 )

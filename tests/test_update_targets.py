@@ -1,12 +1,14 @@
 """Updates of constants that were fitted to several targets, which are off together where the arm is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import truearm as ta
 from truearm.fits.known_scale import common_share
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
 
 TARGETS_MM = ((30.0, 20.0, 50.0), (-60.0, 10.0, 80.0), (20.0, -70.0, 20.0))
 
@@ -64,7 +66,26 @@ def test_the_common_share_is_that_of_drawn_displacements():
     own, shared = random.normal(size=(4000, 2, 3)), random.normal(size=(4000, 1, 3))
     residual = (own + 2.0 * shared).reshape(4000, 6)
     residual[::3, 3:] = 0.0
-    weight = np.ones(4000)
-    assert common_share(residual, weight, 2, np.sqrt(5.0)) == pytest.approx(0.8, abs=0.03)
-    assert common_share(own.reshape(4000, 6), weight, 2, 1.0) < 0.05
-    assert common_share(residual[:, :3], weight, 1, 1.0) == 0.0
+    weight, nothing = np.ones(4000), np.zeros(4000)
+    assert common_share(residual, weight, 2, np.sqrt(5.0), nothing) == pytest.approx(0.8, abs=0.03)
+    assert common_share(own.reshape(4000, 6), weight, 2, 1.0, nothing) < 0.05
+    assert common_share(residual[:, :3], weight, 1, 1.0, nothing) == 0.0
+    assert common_share(residual, weight, 2, 2.0, nothing + 1.0) == pytest.approx(1.0, abs=0.03)
+    for scale in (0.5, 2.0):
+        share = common_share(scale * residual, weight, 2, np.sqrt(5.0), nothing)
+        assert share == pytest.approx(0.8, abs=0.03)
+
+
+@pytest.mark.parametrize("robust", ["none", "cauchy"])
+def test_targets_with_constants_that_leave_much_are_calibrated(robust):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(noise_mm=0.01))
+    found = ta.calibrate(arm.robot, with_targets(arm, 40, 1), model="constant", robust=robust)
+    assert 0.8 < found.constant.scale.common < 0.99
+
+
+def test_targets_that_differ_by_nothing_have_noise_of_their_own(known):
+    scale = replace(known[1].constant.scale, common=1.0)
+    spread = replace(known[1], constant=replace(known[1].constant, scale=scale)).spread
+    noise = spread.noise(np.zeros((1, 9, 1)), np.zeros(9, dtype=np.bool_))[0]
+    assert np.linalg.eigvalsh(noise).min() > 0.0
+    assert np.isfinite(np.linalg.cholesky(np.linalg.inv(noise))).all()

@@ -13,7 +13,7 @@ from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
 from truearm.certainty.conservative import conservative_of
 from truearm.certainty.threes import AXES as ROWS_TOGETHER
-from truearm.certainty.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
+from truearm.certainty.uncertainty import ConstantSpread, SetupPlace, Spread, UpdatedSpread, VariableSpread
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
 from truearm.fits.core_set import Selection
@@ -280,9 +280,9 @@ class Calibration:
     ) -> Floats:
         """Standard deviation of each coordinate that `position` gives for the same arguments, (n, 3), m.
 
-        Along the axes of the base frame, or with a group or a target along those of its world. It holds for
-        base and tool as the device saw them in the set-up with the surest rows. Where the arm's own base and
-        flange are, no measurement of a target tells; work objects and tools found through the calibrated arm
+        Along the axes of the base frame, for base and tool as the device saw them in the set-up with the
+        surest rows; or with a group or a target in that set-up's world, as its own rows tell it. Where the
+        arm's own base and flange are no target tells; work objects and tools found through the calibrated arm
         take it over. Noise of a measurement is no part, but of a model with constants alone all is that they
         leave beside the rows' own sigma: noise that is not stated, they cannot tell apart.
         """
@@ -430,7 +430,8 @@ class Calibration:
         """Covariance (n, m, m) of an end's position, or pose, as the device saw base and target."""
         flanges = self.pose(rows, tool=np.eye(4), features=features)
         moved = end.motions(flanges, pose=jacobian.shape[1] > ROWS_TOGETHER)
-        return self.spread.covariance(self.field_inputs(rows, features), jacobian, moved)
+        place = SetupPlace.at(self, end)
+        return self.spread.covariance(self.field_inputs(rows, features), jacobian, moved, place)
 
     def _jacobian(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool

@@ -62,7 +62,7 @@ def _in_common(task: Task, fits: Fits, precisions: Floats) -> Floats:
         precisions: Of what rows hold (n, m).
     """
     constant, data, targets = fits.constant, fits.data, len(task.selection.targets)
-    share = common_share(constant.residuals, constant.weights, targets, constant.noise[0])
+    share = _share(task, fits)
     if share == 0.0:
         return np.zeros_like(constant.covariance)
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
@@ -75,6 +75,12 @@ def _in_common(task: Task, fits: Fits, precisions: Floats) -> Floats:
     points = rows[:, : AXES * targets].reshape(len(rows), targets, AXES, -1)
     pairs = _squares(points.sum(axis=1)) - _squares(points)
     return np.asarray(share * constant.noise[0] ** 2 * (constant.covariance @ pairs @ constant.covariance))
+
+
+def _share(task: Task, fits: Fits) -> float:
+    """Share of the noise of the constant fit that targets of a pose have in common."""
+    fit, targets = fits.constant, len(task.selection.targets)
+    return common_share(fit.residuals, fit.weights, targets, fit.noise[0], fits.data.stated_sigma_m)
 
 
 def _squares(rows: Floats) -> Floats:
@@ -117,7 +123,7 @@ def _widened(task: Task, fits: Fits) -> float:
 def constant_details(task: Task, fits: Fits) -> ConstantDetails:
     """What a fit found beside its constants, with how far these are off."""
     names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
-    common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
+    common = _share(task, fits)
     rank, widened = fits.identifiability.total_rank, _widened(task, fits)
     scale = KnownScale.of(fit.residuals, rank, fits.data.sigma_m, common, widened)
     return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)

@@ -13,6 +13,7 @@ from truearm.certainty.successive import Successive
 from truearm.certainty.threes import AXES, in_threes
 from truearm.errors import InputError, WorkError
 from truearm.fits.core_set import core_set
+from truearm.fits.endpoints import Endpoint
 from truearm.fits.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
 from truearm.fits.fitting import (
     KnownHyper,
@@ -33,6 +34,8 @@ Mask = NDArray[np.bool_]
 
 BATCH: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""
+FINEST: Final = 1e-8
+"""No device tells points or turns of an arm more finely, m and rad."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
 """Of the base, and of the tool's place."""
 
@@ -40,11 +43,18 @@ MOTIONS: Final = FRAME_UNKNOWNS + AXES
 class Spread(Protocol):
     """Knows how uncertain the arm's parameters are."""
 
-    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+    def covariance(
+        self,
+        inputs: Floats,
+        jacobian: Floats,
+        moved: Floats | None = None,
+        place: "SetupPlace | None" = None,
+    ) -> Floats:
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
 
         With `moved` (n, m, 9 or 12), derivatives by motions of base and tool as in SetupPlace, it is that of
-        what the device of the surest set-up sees: what frame and target can take over counts no more.
+        what the device of a set-up sees: what frame and target can take over counts no more. It is the
+        set-up of `place`, by default the surest.
         """
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
@@ -88,6 +98,14 @@ class SetupPlace:
         surest, turned = measured.surest(task.groups), measured.most_turned(task.groups)
         return cls(_motion(task, measured, surest), _motion(task, measured, turned))
 
+    @classmethod
+    def at(cls, calibration: "Calibration", end: Endpoint) -> "SetupPlace | None":
+        """Of the set-up in whose world the end is, as its target if it is one; None in the base frame."""
+        if end.group is None:
+            return None
+        motion = _motion(task_of(calibration), calibration.measured, end.group, end.target)
+        return cls(motion, motion)
+
     def among_all(self, moved: Floats | None) -> Floats | None:
         """Derivatives (n, m, S) by all of them, of those (n, m, k) by the first k motions."""
         if moved is None:
@@ -98,14 +116,18 @@ class SetupPlace:
         return np.ascontiguousarray(found)
 
 
-def _motion(task: Task, measured: MeasuredParts, group: int) -> Floats:
-    """Motion (12, S) of base, tool and measured orientation with the unknowns of one set-up."""
+def _motion(task: Task, measured: MeasuredParts, group: int, only: int | None = None) -> Floats:
+    """Motion (12, S) of base, tool and measured orientation with the unknowns of one set-up.
+
+    The tool moves as the middle of its targets, or as `only` one of them.
+    """
     frame, count = frame_unknowns(task), setup_unknowns(task)
     width = count // len(task.groups)
     start, end = group * width, (group + 1) * width
     motion = np.zeros((MOTIONS + AXES, count))
     motion[:frame, start : start + frame] = np.eye(frame)
-    for k, share in enumerate(measured.shares(group)[: len(task.selection.targets)]):
+    shares = measured.shares(group) if only is None else np.eye(len(measured.shares(group)))[only]
+    for k, share in enumerate(shares[: len(task.selection.targets)]):
         target = start + frame + AXES * k
         motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = share * np.eye(AXES)
     if measured.orientations[group]:
@@ -155,9 +177,15 @@ class ConstantSpread:
         found[count : count + AXES, count : count + AXES] += self.noises[0] ** 2 * np.eye(AXES)
         return np.asarray(found)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+    def covariance(
+        self,
+        inputs: Floats,
+        jacobian: Floats,
+        moved: Floats | None = None,
+        place: SetupPlace | None = None,
+    ) -> Floats:
         """Covariance (n, m, m), the same rule everywhere; with `moved` what the constants leave is added."""
-        found = self.each(inputs, jacobian, self.place.among_all(moved))
+        found = self.each(inputs, jacobian, (place or self.place).among_all(moved))
         if moved is None:
             return found
         return found + np.diag(np.repeat(np.square(self.noises), AXES)[: jacobian.shape[1]])
@@ -191,12 +219,18 @@ class ConstantSpread:
         left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
         return np.asarray(left @ self.of_all[:size, :size] @ right.T)
 
+    @property
+    def _shared(self) -> float:
+        """Covariance of two targets of one pose along the same axis, m^2: each has a part of its own."""
+        whole = self.noises[0] ** 2
+        return min(self.common * whole, max(whole - FINEST**2, 0.0))
+
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """What no constant explains, alike everywhere; targets of one pose have part of it in common."""
         noise = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
         targets = int((~orientation).sum()) // AXES
         together = np.kron(np.ones((targets, targets)) - np.eye(targets), np.eye(AXES))
-        noise[: len(together), : len(together)] += self.common * self.noises[0] ** 2 * together
+        noise[: len(together), : len(together)] += self._shared * together
         return np.repeat(noise[None], len(jacobian), axis=0)
 
 
@@ -240,9 +274,15 @@ class VariableSpread:
         place = SetupPlace.of(task, calibration.measured)
         return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+    def covariance(
+        self,
+        inputs: Floats,
+        jacobian: Floats,
+        moved: Floats | None = None,
+        place: SetupPlace | None = None,
+    ) -> Floats:
         """Covariance (n, m, m) at inputs (n, I)."""
-        return self.each(inputs, jacobian, self.place.among_all(moved))
+        return self.each(inputs, jacobian, (place or self.place).among_all(moved))
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """Covariance (n, m, m) at inputs (n, I), exact."""
@@ -303,12 +343,18 @@ class UpdatedSpread:
         place = SetupPlace.of(task_of(calibration), calibration.measured)
         return cls(before, revision.directions, revision.covariance, revision.carried, place)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
+    def covariance(
+        self,
+        inputs: Floats,
+        jacobian: Floats,
+        moved: Floats | None = None,
+        place: SetupPlace | None = None,
+    ) -> Floats:
         """Covariance (n, m, m)."""
         if self.carried is None:
             own = _each(self._own_rows(jacobian, None), self.of_all)
             return self.before.covariance(inputs, jacobian, moved) + own
-        return self.each(inputs, jacobian, self.place.among_all(moved))
+        return self.each(inputs, jacobian, (place or self.place).among_all(moved))
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """Covariance (n, m, m), each of its own."""

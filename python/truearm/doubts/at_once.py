@@ -5,7 +5,7 @@ in the world at all poses, so that no displacement of the set-up follows it. Wha
 asked, for each place in the order of measuring, whether it is explained by such a step from there on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,6 +28,8 @@ BESIDE: Final = 5
 """Visits before and behind a step, at the least: fewer are outliers."""
 FAINT: Final = 0.01
 """Part of a direction that is left beside what was fitted, below which that imitates it."""
+NOTHING: Final = 1e-9
+"""Part of what columns tell by themselves, below which a direction of several is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,8 @@ def likeliest_step(
 
     It is the score test of generalised least squares: a step is fitted beside all that was fitted, without
     its being searched again, and beside steps of the columns `beside` at the same place, which are told
-    elsewhere. Steps of unlike many columns are compared by their evidence (Schwarz 1978).
+    elsewhere. Steps of unlike many columns are compared by their evidence (Schwarz 1978). Several targets$
+    step each by itself or, on a tool that moves, all alike.
 
     Args:
         left: What is left.
@@ -105,16 +108,18 @@ def likeliest_step(
     """
     from scipy.special import betaincc  # noqa: PLC0415 - slow to import
 
-    gram, pull, unit = _behind(left, columns)
+    gram, pull, alone = _behind(left, columns)
     places = np.concatenate([[0] * others, np.arange(BESIDE, len(gram) - BESIDE + 1)]).astype(np.int64)
     if not len(places) or left.freedom <= 0.0:
         return None
-    gram, pull, unit = gram[places], pull[places], unit[places]
-    told, pull, gram, rank_beside = _without(gram, pull, list(beside))
+    gram, pull, alone = gram[places], pull[places], alone[places]
+    told, pull, gram, rank_beside = _without(gram, pull, alone, list(beside))
     found: Step | None = None
-    for shape in shapes:
+    ways = [(shape, along) for shape in shapes for along in _ways(shape)]
+    for shape, along in ways:
         own = list(shape.columns)
-        sizes, squares, ranks = _solved(gram[:, own][:, :, own], pull[:, own])
+        gram_along, alone_along = (along.T @ each[:, own][:, :, own] @ along for each in (gram, alone))
+        sizes, squares, ranks = _solved(gram_along, pull[:, own] @ along, alone_along)
         share = np.clip(squares / np.maximum(left.square - told, squares), 0.0, 1.0)
         free = left.freedom - rank_beside - ranks
         usable = (ranks > 0) & (free > ranks)
@@ -124,40 +129,54 @@ def likeliest_step(
         k = int(np.argmax(gain))
         if not np.isfinite(gain[k]) or (found is not None and gain[k] <= found.gain):
             continue
-        chance = float(betaincc(0.5 * ranks[k], 0.5 * free[k], share[k])) * len(places) * len(shapes)
-        by = sizes[k] / unit[k, own]
-        found = Step(shape, int(places[k]), by, float(share[k]), float(gain[k]), min(chance, 1.0))
+        chance = float(betaincc(0.5 * ranks[k], 0.5 * free[k], share[k])) * len(places) * len(ways)
+        found = Step(
+            shape, int(places[k]), along @ sizes[k], float(share[k]), float(gain[k]), min(chance, 1.0)
+        )
     return found
+
+
+def _ways(shape: Shape) -> Iterator[Floats]:
+    """Directions (c, r) of its columns that a shape may step along: all of them, and targets all alike."""
+    yield np.eye(len(shape.columns))
+    count, others = len(shape.numbers), len(shape.columns) - AXES * len(shape.numbers)
+    if shape.what == TARGET and count > 1 and others >= 0:
+        alike = np.zeros((len(shape.columns), AXES + others))
+        alike[: AXES * count, :AXES] = np.tile(np.eye(AXES), (count, 1))
+        alike[AXES * count :, AXES:] = np.eye(others)
+        yield alike
 
 
 def _behind(left: Left, columns: Floats) -> tuple[Floats, Floats, Floats]:
     """Of the columns, zero before each visit, their products (v, p, p) over the metric and (v, p) with the
-    pull, in units (v, p) of the columns on its lesser side.
+    pull; and what noise alone would tell (v, p, p) of a step there, were only the columns' level fitted.
     """
     starts = np.flatnonzero(np.diff(left.visit, prepend=-1))
     ends = np.append(starts[1:], len(left.visit))
     count = columns.shape[1]
-    gram, known = np.empty((len(starts), count, count)), np.zeros((count, count))
-    pull, square = np.empty((2, len(starts), count))
+    gram, each = np.empty((2, len(starts), count, count))
+    pull, known = np.empty((len(starts), count)), np.zeros((count, count))
     for k in reversed(range(len(starts))):
         own, behind = slice(starts[k], ends[k]), slice(ends[k], None)
         here = columns[own]
         across = here.T @ (left.metric[own, behind] @ columns[behind])
         known = known + here.T @ left.metric[own, own] @ here + across + across.T
         gram[k], pull[k] = known, left.pull[own] @ here
-        square[k] = (here * (left.alone[own, own] @ here)).sum(axis=0)
-    pull, square = (np.cumsum(each[::-1], axis=0)[::-1] for each in (pull, square))
-    unit = np.sqrt(np.minimum(square, np.maximum(square[0] - square, 0.0)))
-    unit[0] = np.sqrt(square[0])
-    unit[unit == 0.0] = 1.0
-    return gram / (unit[:, :, None] * unit[:, None]), pull / unit, unit
+        each[k] = here.T @ left.alone[own, own] @ here
+    pull, later = (np.cumsum(part[::-1], axis=0)[::-1] for part in (pull, each))
+    whole, before = later[0], np.cumsum(each, axis=0) - each
+    alone = later @ np.linalg.pinv(whole, hermitian=True) @ before
+    alone[0] = whole
+    return gram, pull, 0.5 * (alone + alone.transpose(0, 2, 1))
 
 
-def _without(gram: Floats, pull: Floats, beside: list[int]) -> tuple[Floats, Floats, Floats, Floats]:
+def _without(
+    gram: Floats, pull: Floats, alone: Floats, beside: list[int]
+) -> tuple[Floats, Floats, Floats, Floats]:
     """What some columns explain (k,), the pull (k, p) and the products (k, p, p) of all beside them, and how
     many of them tell something (k,).
     """
-    inverse, rank = _inverse(gram[:, beside][:, :, beside])
+    inverse, rank = _inverse(gram[:, beside][:, :, beside], alone[:, beside][:, :, beside])
     across = gram[:, :, beside] @ inverse
     told = np.einsum("ka,kab,kb->k", pull[:, beside], inverse, pull[:, beside])
     return (
@@ -168,16 +187,26 @@ def _without(gram: Floats, pull: Floats, beside: list[int]) -> tuple[Floats, Flo
     )
 
 
-def _solved(gram: Floats, pull: Floats) -> tuple[Floats, Floats, Floats]:
+def _solved(gram: Floats, pull: Floats, alone: Floats) -> tuple[Floats, Floats, Floats]:
     """Coefficients (k, c), the squares that they explain (k,), and how many directions tell more (k,)."""
-    inverse, rank = _inverse(gram)
+    inverse, rank = _inverse(gram, alone)
     sizes = np.einsum("kab,kb->ka", inverse, pull)
     return sizes, np.einsum("ka,ka->k", sizes, pull), rank
 
 
-def _inverse(gram: Floats) -> tuple[Floats, Floats]:
-    """Inverses (k, c, c) along the directions that are not imitated, and how many these are (k,)."""
-    values, directions = np.linalg.eigh(gram)
+def _inverse(gram: Floats, alone: Floats) -> tuple[Floats, Floats]:
+    """Inverses (k, c, c) along the directions that are not imitated, and how many these are (k,).
+
+    Imitated is what is told next to nothing of beside what was fitted, of what noise alone (k, c, c) would
+    tell: a target is told by its differences to others far better than the shift that all have in common.
+    """
+    unit = np.sqrt(np.maximum(np.einsum("kaa->ka", alone), 0.0))
+    scale = np.where(unit > 0.0, 1.0 / np.where(unit > 0.0, unit, 1.0), 0.0)[:, :, None]
+    values, directions = np.linalg.eigh(alone * scale * scale.transpose(0, 2, 1))
+    is_one = values > NOTHING
+    whitening = scale * directions * np.where(is_one, np.where(is_one, values, 1.0) ** -0.5, 0.0)[:, None]
+    values, directions = np.linalg.eigh(whitening.transpose(0, 2, 1) @ gram @ whitening)
     told = values > FAINT
-    scaled = directions * np.where(told, 1.0 / np.where(told, values, 1.0), 0.0)[:, None]
-    return scaled @ directions.transpose(0, 2, 1), told.sum(axis=1).astype(np.float64)
+    scaled = directions * np.where(told, np.where(told, values, 1.0) ** -0.5, 0.0)[:, None]
+    root = whitening @ scaled
+    return root @ root.transpose(0, 2, 1), told.sum(axis=1).astype(np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import CoreError, Setup, fit_constant
-from truearm.doubts.zeros_together import found_together
+from truearm.doubts.zeros_together import counted_parts, found_together
 from truearm.errors import Notice, count_of, list_names
 from truearm.fits.core_set import anchor_names, core_set
 from truearm.fits.fitting import Task, fit_options
@@ -136,9 +136,9 @@ def _notices(
 def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int]) -> Zero | None:
     """That of rows of one set-up, by its number, with distances to one anchor, by its number.
 
-    Residuals add up to nothing where the length is right: with the fixed point and the target found anew for
-    each length, their sum is half of what the sum of squares falls by it. The secant method finds it. All
-    rows count alike, whatever their sigma.
+    Residuals, weighed as rows are in the fit, add up to nothing where the length is right: with the fixed
+    point and the target found anew for each length, their sum is half of what the sum of squares falls by it.
+    The secant method finds it.
 
     Returns:
         None where no length that is shorter than all distances does.
@@ -149,32 +149,39 @@ def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int
     frame, targets, turned = (part[[group]] for part in (setup.frames, setup.targets, setup.rotations))
     options["start"] = Setup(frame, targets, turned, setup.anchors[[anchor]])
 
-    def left(length_m: float) -> Floats:
-        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m, sigma_m=None)
+    def left(length_m: float) -> tuple[Floats, Floats]:
+        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m)
         problem = own.problem(core_set(own.arm.robot, shorter, own.selection, own.groups), [])
         fit = fit_constant(problem, options)
         options["start"] = fit.setup
-        return fit.residuals
+        residuals = np.asarray(fit.residuals).ravel()
+        return residuals, counted_parts(fit.noise[0], rows.stated_sigma_m)
 
     shortest = float(np.asarray(rows.distance_m).min())
     try:
         without = left(0.0)
-        now, length, step = without, 0.0, float(np.copysign(FIRST_M, without.sum()))
+        now, length, step = without, 0.0, float(np.copysign(FIRST_M, _sum(without)))
         for _ in range(MOST_STEPS):
             step = min(step, 0.5 * (shortest - length))
             length, before, now = length + step, now, left(length + step)
-            counted = float(before.sum() - now.sum()) / step if step else 0.0
+            counted = (_sum(before) - _sum(now)) / step if step else 0.0
             # Far from where it is right the sum hardly changes: on in larger steps.
-            step = float(now.sum()) / counted if counted > 0.0 else 2.0 * step
+            step = _sum(now) / counted if counted > 0.0 else 2.0 * step
             if counted > 0.0 and abs(step) < ENOUGH_M:
                 break
         else:
             return None
     except CoreError:
         return None
-    before_m, after_m = (float(np.sqrt(np.square(each).mean())) for each in (without, now))
+    parts = now[1]
+    before_m, after_m = (float(np.sqrt((parts * np.square(each)).mean())) for each, _ in (without, now))
     noise = after_m * np.sqrt(len(rows) / (len(rows) - UNKNOWNS))
     return Zero(length, float(noise / np.sqrt(counted)), before_m, after_m)
+
+
+def _sum(left: tuple[Floats, Floats]) -> float:
+    """The sum of residuals (n,) with weights (n,)."""
+    return float(left[0] @ left[1])
 
 
 def _notice(wires: Sequence[Wire], zero: Zero) -> Notice:

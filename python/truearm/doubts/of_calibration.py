@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import constant_details
+from truearm.defaults import NO_DRIFT
 from truearm.doubts.conventions import BETTER, NEAR_M, fits_otherwise
 from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
@@ -28,7 +29,8 @@ from truearm.doubts.of_results import (
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
-from truearm.doubts.slips import main_slips, slips
+from truearm.doubts.slips import Slip, main_slips, slips
+from truearm.doubts.tool_slips import tool_slips
 from truearm.doubts.turned_later import turned_in_setups, turned_later
 from truearm.doubts.unbent import may_be_bent, unbent
 from truearm.doubts.uneven_setups import uneven_setups
@@ -38,19 +40,21 @@ from truearm.fits.details import VariableDetails, left_m
 from truearm.fits.endpoints import at_tool
 from truearm.fits.enough_values import group_unknowns
 from truearm.fits.fitted_rows import FittedRows
-from truearm.fits.fitting import Fits, Task
+from truearm.fits.fitting import Fits, Task, fit_rows
 from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
 from truearm.judgement.judging import check_judged
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
-from truearm.stages import Stages
+from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
 
 Floats = NDArray[np.float64]
 
 OPEN_SETUP: Final = "open_setup"
+UNFOLLOWED: Final = 3.0
+"""Mean error of held-out rows, in what noise alone would leave, that those which trained do not tell of."""
 REASONS: Final = {*EXCHANGED, *WOULD_FIT}
 """Notices of what is wrong with rows."""
 WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *REASONS}
@@ -99,7 +103,7 @@ def of_result(
     told, robust = _doubted(task, found, data, stages)
     kinds = {notice.kind for notice in told}
     if kinds & WRONG_ROWS:
-        return told if kinds & REASONS else [*told, *_reason(found, progress)]
+        return told if kinds & REASONS else [*told, *_reason(task, found, progress)]
     return [*told, *_of_left(task, found, progress, robust)]
 
 
@@ -111,21 +115,40 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
     if rows is None or found.scheme is not None or found.selection.distances:
         return []
     if may_be_bent(found) and rows.outliers():
-        found, rows = _unbent(task, found, rows, robust or unbent(task, rows))
+        found, rows = _of_constants(task, found, rows, robust or unbent(task, rows))
     seen = Whitened.of(found, rows, progress)
-    slipped = slips(found, rows, seen, progress)
+    slipped = slips(found, rows, seen, progress) or _slips_by_constants(task, found, rows, progress)
     return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
 
 
-def _reason(found: Calibration, progress: Floats) -> list[Notice]:
+def _reason(task: Task, found: Calibration, progress: Floats) -> list[Notice]:
     """What stands otherwise from some row on, where that explains most of what a calibration leaves."""
     if found.rows is None or found.scheme is not None or found.selection.distances:
         return []
-    return [slip.notice for slip in main_slips(found, found.rows, progress)]
+    slipped = main_slips(found, found.rows, progress)
+    slipped = slipped or _slips_by_constants(task, found, found.rows, progress)
+    return [slip.notice for slip in slipped]
 
 
-def _unbent(task: Task, found: Calibration, rows: FittedRows, fits: Fits) -> tuple[Calibration, FittedRows]:
-    """The calibration with constants that its outliers do not bend, and the rows as these have them."""
+def _slips_by_constants(task: Task, found: Calibration, rows: FittedRows, progress: Floats) -> list[Slip]:
+    """Slips of a tool with several targets, which what varies follows at the poses that it was fitted to.
+
+    Asked where it is far more off at others than noise would leave it.
+    """
+    if found.variable is None or found.options.drift == NO_DRIFT or len(found.selection.targets) < 2:
+        return []
+    if found.validation.holdout[found.model_name].position.mean < UNFOLLOWED * distance_at_floor_mm(found):
+        return []
+    options = replace(task.options, model=CONSTANT)
+    fits = fit_rows(replace(task, options=options, starts=(), stages=no_stages), rows.fitted)
+    of_constants = replace(found, options=options, variable=None, fitted_spread=None)
+    return tool_slips(*_of_constants(task, of_constants, rows, fits), progress)
+
+
+def _of_constants(
+    task: Task, found: Calibration, rows: FittedRows, fits: Fits
+) -> tuple[Calibration, FittedRows]:
+    """The calibration with constants of other fits to its rows, and the rows as these have them."""
     constant, models = constant_details(task, fits), fits.models(task.arm)
     told = replace(found, models=models, identifiability=fits.identifiability, constant=constant)
     return told, FittedRows.of(fits, rows.side, task.selection)

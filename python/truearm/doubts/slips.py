@@ -185,7 +185,7 @@ def main_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list
 def _slips(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Slip]:
     if found.variable is None or found.options.drift == NO_DRIFT:
         return []
-    return slips_of(list(_sessions(found, fitted, seen)))
+    return slips_of(list(sessions_of(found, fitted, seen)))
 
 
 def slips_of(sessions: Sequence[Session]) -> list[Slip]:
@@ -203,7 +203,7 @@ def slips_of(sessions: Sequence[Session]) -> list[Slip]:
     return told
 
 
-def _sessions(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterator[Session]:
+def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterator[Session]:
     """Those of a calibration's set-ups."""
     group, width = fitted.data.group[seen.rows], seen.left.shape[1]
     frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS

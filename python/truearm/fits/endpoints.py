@@ -28,12 +28,16 @@ class Endpoint:
         world_from_base: Transform (4, 4), or None for the base frame.
         has_orientation: Whether the rotation of `flange_from_end` means anything.
         turn_is_fitted: Whether that rotation was found by the fit, from a target's measured orientation.
+        group: Number of the set-up whose world it is, from 0; None for the base frame.
+        target: Place of the target that it is among those that were fitted; None for a tool.
     """
 
     flange_from_end: Floats
     world_from_base: Floats | None = None
     has_orientation: bool = True
     turn_is_fitted: bool = False
+    group: int | None = None
+    target: int | None = None
 
     def motions(self, flanges: Floats, *, pose: bool) -> Floats:
         """How the end moves with base and tool as the device saw them, see SetupPlace.motion.
@@ -105,7 +109,7 @@ def at_target(
     if tool is not None:
         if target is not None:
             raise UsageError("a tool and a target were given", rule="A prediction is of one of them")
-        return Endpoint(at_tool(calibration.robot, tool), world_from_base)
+        return Endpoint(at_tool(calibration.robot, tool), world_from_base, group=number)
     known = [k + 1 for k in selection.targets] or [1]
     held = calibration.measured.targets[number]
     if target is not None:
@@ -113,18 +117,19 @@ def at_target(
     wanted = known[calibration.measured.first(number)] if target is None else target
     if wanted not in known:
         raise UsageError(f"there is no target {wanted}", rule=f"Targets {known} were fitted")
-    if not held[known.index(wanted)]:
+    place = known.index(wanted)
+    if not held[place]:
         raise WorkError(
             f"target {wanted} was not measured in the set-up {list_names([calibration.groups[number]])}",
             rule="Where it is on the tool there no other set-up tells",
             way_out="Ask for a target that was, or give a tool",
         )
     transform = np.eye(4)
-    transform[:3, 3] = setup.targets[number, known.index(wanted)]
+    transform[:3, 3] = setup.targets[number, place]
     turned = bool(calibration.measured.orientations[number])
     if turned:
         transform[:3, :3] = setup.rotations[number]
-    return Endpoint(transform, world_from_base, turned, turn_is_fitted=turned)
+    return Endpoint(transform, world_from_base, turned, turn_is_fitted=turned, group=number, target=place)
 
 
 def _group_number(calibration: "Calibration", group: str | None) -> int:

@@ -40,22 +40,29 @@ class KnownScale:
         return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)
 
 
-def common_share(residual: Floats, weight: Floats, targets: int, noise_m: float) -> float:
-    """Share of the variance of positions that all targets of a pose have in common, from 0 to 1.
+def common_share(residual: Floats, weight: Floats, targets: int, noise_m: float, stated_m: Floats) -> float:
+    """Share of the noise of positions that all targets of a pose have in common, from 0 to 1.
 
-    It is the mean product of residuals of two targets of one pose along the same axis, over noise^2.
+    It is the correlation of two targets of one pose along the same axis, as weighted residuals have it,
+    whatever the scale that a fit or its loss leaves them, times the whole variance `noise^2 + sigma^2` over
+    that of the noise: what rows state as their sigma is of each target by itself.
 
     Args:
         residual: Of n rows, of positions first (3 t each), m; zero where not measured.
         weight: Of the rows (n,).
         targets: How many there are, t.
         noise_m: Standard deviation of what is left of a coordinate, beside sigmas of the rows.
+        stated_m: These sigmas (n,), m; zero where none is stated.
     """
     if targets < 2 or noise_m <= 0.0:
         return 0.0
     points = residual.reshape(len(weight), -1)[:, : 3 * targets].reshape(-1, targets, 3)
     seen = (points != 0.0).any(axis=2).astype(np.float64)
     apart = ~np.eye(targets, dtype=np.bool_)
-    pairs = np.einsum("n,nk,nl->kl", weight, seen, seen)[apart].sum()
-    products = np.einsum("n,nki,nli->kl", weight, points, points)[apart].sum() / 3.0
-    return float(np.clip(products / pairs / noise_m**2, 0.0, 1.0)) if pairs > 0.0 else 0.0
+    products = np.einsum("n,nki,nli->kl", weight, points, points)[apart].sum()
+    squares = np.einsum("n,nki,nki,nl->kl", weight, points, points, seen)[apart].sum()
+    if squares <= 0.0:
+        return 0.0
+    pairs = weight * seen.sum(axis=1) * (seen.sum(axis=1) - 1.0)
+    whole = noise_m**2 + float(np.average(np.square(stated_m), weights=pairs))
+    return float(np.clip(products / squares * whole / noise_m**2, 0.0, 1.0))

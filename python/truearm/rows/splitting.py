@@ -22,6 +22,12 @@ Mask = NDArray[np.bool_]
 NAMED: Final = 5
 FEW_KNOWN: Final = 0.05
 """Share of held-out rows of poses that trained, which changes next to nothing in their errors."""
+LINKED: Final = 0.2
+"""Share of all rows above which those that pairs link are parted."""
+STRETCHES: Final = 20
+"""How many stretches of poses they are parted into,"""
+SHORTEST: Final = 5
+"""each of so many poses at the least; fewer than two such stretches are not parted."""
 RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
 
 
@@ -79,8 +85,11 @@ class SplitRule:
     and `holdout_range` come first.
 
     Rows with the same joint vector, rows after one another that were read within 0.3 mrad or mm of one
-    pose, and the two rows of a pair, stay together, on the side of the first. `train_size` takes no half of
-    a pair: one that does not fit is passed over, for what comes next in the permutation.
+    pose, and the two rows of a pair, stay together, on the side of the first. Where pairs link more than a
+    fifth of all rows, as in a chain in which each pose is in two of them, stretches of its poses, in the
+    order of the rows, stay together, and pairs between both sides take no part but in the last fit.
+    `train_size` takes no half of a pair: one that does not fit is passed over, for what comes next in the
+    permutation.
 
     Attributes:
         holdout: Part of the rows that is held out, between 0 and 1.
@@ -197,11 +206,11 @@ def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule)
         held = np.zeros(len(rows), dtype=np.bool_)
         held[order[_trained(len(rows), rule.holdout) :]] = True
     held = _together(held, rows, first_of)
+    whole = _on_one_side(data, rows, held)
     if rule.split_by or rule.holdout_range is not None or planned.any():
         order = np.concatenate([rng.permutation(np.flatnonzero(~held)), np.flatnonzero(held)])
-    train, holdout = order[~held[order]], order[held[order]]
-    where = str(data.sources[rows[0]])
-    _check_sizes(len(train), len(holdout), rule, where)
+    train, holdout = order[(~held & whole)[order]], order[(held & whole)[order]]
+    _check_sizes(len(train), len(holdout), rule, data.select(rows))
     count = len(holdout) if planned.any() else 0
     return Split(train=_first(data, rows[train], rule), holdout=rows[holdout], planned=count)
 
@@ -313,15 +322,37 @@ def _first_of_kin(data: Measurements) -> Rows:
     count = len(data)
     _, alike = np.unique(data.readings, axis=0, return_inverse=True)
     links = [alike.reshape(-1), visit_numbers(data.readings, data.sources)]
-    if data.pair is not None:
-        _, pair = np.unique(data.pair, return_inverse=True)
-        alone = data.pair == ""
-        links.append(np.where(alone, len(pair) + np.arange(count), pair))
     kin = np.arange(count)
     for labels in links:
         kin = _components(kin, labels)
+    if data.pair is not None:
+        _, pair = np.unique(data.pair, return_inverse=True)
+        alone = data.pair == ""
+        kin = _parted(kin, _components(kin, np.where(alone, len(pair) + np.arange(count), pair)))
     _, first, index = np.unique(kin, return_index=True, return_inverse=True)
     return np.asarray(first[index.reshape(-1)], dtype=np.int64)
+
+
+def _parted(pose: Rows, linked: Rows) -> Rows:
+    """Labels (n,) of rows that pairs link (n,), of many poses (n,) those of stretches of these."""
+    found, further = linked.copy(), int(linked.max()) + 1
+    for label, count in zip(*np.unique(linked, return_counts=True), strict=True):
+        own = np.flatnonzero(linked == label) if count > LINKED * len(linked) else np.empty(0, np.int64)
+        _, first, number = np.unique(pose[own], return_index=True, return_inverse=True)
+        if len(first) >= 2 * SHORTEST:
+            place = np.argsort(np.argsort(first))[number.reshape(-1)]
+            found[own] = further + place // max(SHORTEST, len(first) // STRETCHES)
+            further = int(found.max()) + 1
+    return found
+
+
+def _on_one_side(data: Measurements, rows: Rows, held: Mask) -> Mask:
+    """Mask (r,) of rows without those of pairs that have one row on either side."""
+    if data.pair is None:
+        return np.ones(len(rows), dtype=np.bool_)
+    pair = data.pair[rows]
+    both = np.intersect1d(pair[held], pair[~held])
+    return ~np.isin(pair, both[both != ""])
 
 
 def _components(a: Rows, b: Rows) -> Rows:
@@ -351,12 +382,17 @@ def _together(held: Mask, rows: Rows, first_of: Rows) -> Mask:
     return np.asarray(held[first[index.reshape(-1)]])
 
 
-def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
+def _check_sizes(train: int, holdout: int, rule: SplitRule, data: Measurements) -> None:
+    """Whether so many rows of one file leave something to do on either side."""
+    where = str(data.sources[0])
     if holdout == 0 or train == 0:
         side = "held out" if holdout == 0 else "left to train on"
         raise InputError(
             f"no row would be {side}: {count_of(train + holdout, 'row')}, of which {holdout} held out",
             where=where,
+            rule=""
+            if data.pair is None
+            else "The two rows of a pair are on one side, and so are few poses that pairs link",
             way_out="Measure more poses, or hold out another share",
         )
     if rule.train_size is not None and rule.train_size > train:

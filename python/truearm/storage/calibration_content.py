@@ -207,7 +207,8 @@ def _scale_of(rows: FittedRows | None, measured: MeasuredParts, rank: int, noise
     """What files of earlier versions do not say, from their rows, or from how much was measured."""
     if rows is None:
         return KnownScale(max(measured.values - rank, 1), None)
-    common = common_share(rows.residual, rows.weight, measured.targets.shape[1], noise_m)
+    targets, stated_m = measured.targets.shape[1], rows.data.stated_sigma_m
+    common = common_share(rows.residual, rows.weight, targets, noise_m, stated_m)
     return KnownScale.of(rows.residual, rank, rows.data.sigma_m, common)
 
 

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
-from truearm.certainty.uncertainty import noises_of, task_of
+from truearm.certainty.uncertainty import FINEST, noises_of, task_of
 from truearm.description.dh_row import row_transform
 from truearm.fits.core_set import core_set, rotations
 from truearm.fits.enough_values import FRAME_UNKNOWNS, setup_unknowns
@@ -25,8 +25,6 @@ from truearm.updating.unknowns import Unknowns, is_part_of
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FINEST: Final = 1e-8
-"""No device tells points or turns of an arm more finely, m and rad."""
 RANK: Final = 1e-9
 """Columns reach no farther than this share of the farthest in directions that they do not have."""
 
