@@ -273,8 +273,8 @@ def test_a_tool_that_slips_with_its_targets_is_found(targets):
 def test_a_tool_that_slips_is_told_by_the_middle_of_its_targets(slip_mm):
     """Constants leave more than the slip at each pose, and what varies would follow it."""
     arm = VirtualArm(ta.Robot.load("ur10"), seed=2, imperfections=Imperfections(share=0.2, noise_mm=0.01))
-    q, table = arm.poses(60, seed=7), {}
-    table |= {f"q{joint + 1}": q[:, joint] for joint in range(6)}
+    q = arm.poses(60, seed=7)
+    table = {f"q{joint + 1}": q[:, joint] for joint in range(6)}
     for number, target_mm in enumerate(([30.0, 20.0, 50.0], [-60.0, 10.0, 80.0], [20.0, -70.0, 20.0])):
         arm.target_in_flange = 1e-3 * np.array(target_mm)
         points = arm.measure_table(q, seed=1)[["x", "y", "z"]].to_numpy()
@@ -283,6 +283,7 @@ def test_a_tool_that_slips_is_told_by_the_middle_of_its_targets(slip_mm):
         points += 1e-5 * np.random.default_rng(number).normal(size=points.shape)
         table |= {f"{axis}{number + 1 if number else ''}": points[:, k] for k, axis in enumerate("xyz")}
     found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(pd.DataFrame(table)), model="constant")
+    assert found.rows is not None
     told = [str(slip.notice) for slip in tool_slips(found, found.rows, found.rows.data.rows / 60.0)]
     assert len(told) == (slip_mm > 0.0)
     for said in told:

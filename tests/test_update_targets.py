@@ -80,6 +80,7 @@ def test_the_common_share_is_that_of_drawn_displacements():
 def test_targets_with_constants_that_leave_much_are_calibrated(robust):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(noise_mm=0.01))
     found = ta.calibrate(arm.robot, with_targets(arm, 40, 1), model="constant", robust=robust)
+    assert found.constant.scale is not None
     assert 0.8 < found.constant.scale.common < 0.99
 
 

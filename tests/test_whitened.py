@@ -5,7 +5,7 @@ import pytest
 
 import truearm as ta
 from tests.xyzc import xyzc
-from truearm.doubts.at_once import AT_ONCE
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.whitened import Whitened
 from truearm.simulation import VirtualArm
 
@@ -37,4 +37,4 @@ def test_no_more_is_taken_of_rows_than_there_is_of_them(robot, tmp_path):
     assert found.rows is not None
     seen = Whitened.of(found, found.rows, np.linspace(0.0, 1.0, len(found.rows.weight)))
     assert np.linalg.eigvalsh(seen.taken).max() < 1.0 + 1e-6
-    assert not set(AT_ONCE) & {notice.kind for notice in found.notices}
+    assert not set(STEP_KINDS) & {notice.kind for notice in found.notices}

@@ -96,7 +96,7 @@ def likeliest_step(
 
     It is the score test of generalised least squares: a step is fitted beside all that was fitted, without
     its being searched again, and beside steps of the columns `beside` at the same place, which are told
-    elsewhere. Steps of unlike many columns are compared by their evidence (Schwarz 1978). Several targets$
+    elsewhere. Steps of unlike many columns are compared by their evidence (Schwarz 1978). Several targets
     step each by itself or, on a tool that moves, all alike.
 
     Args:
