@@ -113,9 +113,16 @@ def test_poses_that_no_other_supports_are_those_found_by_estimating_without_each
     assert unsupported(found, std, free, 2) == one_by_one[:2]
 
 
-def test_where_an_estimate_moves_far_it_is_made_again_before_others_are_judged(scene):
-    *scene, std, free = spoilt(scene, 1.0)
-    assert len(unsupported(estimated(*scene, std, free), std, free, POSES)) == 1
+def test_where_an_estimate_moves_far_it_is_made_again_before_others_are_judged(scene, monkeypatch):
+    linear, covariance, std, free = spoilt(scene, 1.0)
+    found = estimated(linear, covariance, std, free)
+    (first,) = unsupported(found, std, free, POSES)
+    rest = linear.pose != first
+    alone = solved(of_rows(linear, rest), Scatter(covariance[np.ix_(rest, rest)]), std, free)
+    moved = np.abs(alone - solved(linear, Scatter(covariance), std, free)).max()
+    for share, count in ((0.999, 1), (1.001, 2)):
+        monkeypatch.setattr("truearm.updating.unsupported.LINEAR", share * moved)
+        assert len(unsupported(found, std, free, 2)) == count
 
 
 def test_a_covariance_that_is_none_is_refused_with_the_way_out():
