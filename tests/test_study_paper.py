@@ -170,7 +170,6 @@ def test_claims_of_figures_that_were_not_run_are_left_out(study):
 
 def test_command_writes_its_files(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(paper, "JOINT_REGIONS", 16)
-    monkeypatch.setattr(paper, "SENSITIVITY", dict([next(iter(paper.SENSITIVITY.items()))]))
     monkeypatch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
     out = tmp_path / "study"
     assert main(["study", "paper", "-o", str(out), "--figure", "cmac", "--seeds", "1", "--json"]) == 0
