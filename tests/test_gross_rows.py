@@ -129,7 +129,7 @@ def asked(monkeypatch):
 @pytest.mark.parametrize("seed", range(6))
 def test_ordinary_rows_of_a_worse_day_are_not_named(known, asked, seed):
     other, calibration = known
-    rng = np.random.default_rng(seed)
+    rng, times = np.random.default_rng(seed), []
     table = other.measure_table(other.poses(150, seed=seed + 20), seed=seed + 20)
     for scatter in (rng.normal(size=(150, 3)), rng.laplace(size=(150, 3))):
         worse = table.copy()
@@ -139,8 +139,9 @@ def test_ordinary_rows_of_a_worse_day_are_not_named(known, asked, seed):
             found = told(calibration, worse, frame_rows=frame_rows)
             assert found.errors["variable"].position.mean > 0.15
             assert not [notice for notice in found.notices if notice.rows]
-            # Rows that are unlike the others are taken out at once, not each with a covariance of its own.
-            assert 1 <= len(asked) <= 2
+            times.append(len(asked))
+    # Rows that are unlike the others are taken out at once, not each with a covariance of its own.
+    assert 1 <= max(times) <= 2
 
 
 def test_outliers_are_told_on_standard_error_alone(known, clean, tmp_path, monkeypatch, capsys):
