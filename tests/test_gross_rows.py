@@ -129,7 +129,7 @@ def asked(monkeypatch):
 @pytest.mark.parametrize("seed", range(6))
 def test_ordinary_rows_of_a_worse_day_are_not_named(known, asked, seed):
     other, calibration = known
-    rng, times = np.random.default_rng(seed), []
+    rng, times = np.random.default_rng(seed), list[int]()
     table = other.measure_table(other.poses(150, seed=seed + 20), seed=seed + 20)
     for scatter in (rng.normal(size=(150, 3)), rng.laplace(size=(150, 3))):
         worse = table.copy()

@@ -94,7 +94,7 @@ def spoilt(scene, reach):
 
 def taken_out_one_by_one(linear, covariance, std, free):
     """Poses that no other supports, all others estimated again without each."""
-    out = []
+    out = list[int]()
     while True:
         rest = ~np.isin(linear.pose, out)
         found = estimated(of_rows(linear, rest), covariance[np.ix_(rest, rest)], std, free)
@@ -105,9 +105,9 @@ def taken_out_one_by_one(linear, covariance, std, free):
 
 
 def test_poses_that_no_other_supports_are_those_found_by_estimating_without_each(scene):
-    *scene, std, free = spoilt(scene, 1e-3 * LINEAR)
-    found = estimated(*scene, std, free)
-    one_by_one = taken_out_one_by_one(*scene, std, free)
+    linear, covariance, std, free = spoilt(scene, 1e-3 * LINEAR)
+    found = estimated(linear, covariance, std, free)
+    one_by_one = taken_out_one_by_one(linear, covariance, std, free)
     assert {3, 11, 12, 30} <= set(one_by_one)
     assert unsupported(found, std, free, POSES) == one_by_one
     assert unsupported(found, std, free, 2) == one_by_one[:2]
