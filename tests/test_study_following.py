@@ -1,6 +1,7 @@
 """Paths of the experiment as an arm follows them that a scheme has compensated."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def known():
     wrong[1, [THETA, D]] += [3e-3, 8e-4]
     wrong[2, [THETA, A]] += [-2e-3, 1e-3]
     scheme = Scheme(lambda readings: np.tile(wrong, (len(readings), 1, 1)), robot.tool[:3, 3])
-    made = SimpleNamespace(arm=SimpleNamespace(robot=robot), identified=IdentifiedArm(robot, "world"))
+    made: Any = SimpleNamespace(arm=SimpleNamespace(robot=robot), identified=IdentifiedArm(robot, "world"))
     chain = scheme_chain(made, scheme)
     made.arm.true_position = lambda readings: chain.position(
         np.ascontiguousarray(robot.joints_from_readings(readings)), scheme.parameters(readings)

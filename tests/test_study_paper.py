@@ -117,8 +117,8 @@ def test_pictures_are_written_for_print(study, tmp_path, monkeypatch):
 
 
 def lines_of(axes):
-    """What each line of these axes shows (k, m)."""
-    return np.array([line.get_ydata() for line in axes.lines])
+    """Where each line of these axes is drawn: x and y of its points, each (m,)."""
+    return [(np.asarray(line.get_xdata()), np.asarray(line.get_ydata())) for line in axes.lines]
 
 
 def test_panels_show_errors_and_ceps_of_each_scheme_beside_the_gap(study):
@@ -128,14 +128,13 @@ def test_panels_show_errors_and_ceps_of_each_scheme_beside_the_gap(study):
     for row, name in enumerate(ROWS["figure8"]):
         left, right, angles = axes[2 * row], axes[2 * row + 1], axes[2 * rows + row]
         found = drawn.traces[name]
-        errors, *edges = (line.get_ydata() for line in left.lines)
+        (_, errors), *edges = lines_of(left)
         np.testing.assert_array_equal(errors, found.size_mm)
-        assert [line.get_xdata()[0] for line in left.lines[1:]] == list(drawn.gap)
-        assert len(edges) == 2
+        assert [x[0] for x, _ in edges] == list(drawn.gap)
         ceps = (found.parameters - drawn.made.identified.table)[:, 1]
-        lengths = [line.get_ydata() for line in right.lines[:2]]
+        lengths, turns = ([y for _, y in lines_of(each)[:2]] for each in (right, angles))
         np.testing.assert_allclose(lengths, 1e3 * ceps[:, [D, A]].T)
-        np.testing.assert_allclose(lines_of(angles), np.rad2deg(ceps[:, [THETA, ALPHA]]).T)
+        np.testing.assert_allclose(turns, np.rad2deg(ceps[:, [THETA, ALPHA]]).T)
         assert TITLES[name] in left.get_title(loc="left")
 
 
@@ -145,7 +144,7 @@ def test_points_that_were_not_reached_leave_gaps_in_pictures(study):
     errors_mm[:3] = np.nan
     lost = replace(drawn.traces["variable"], errors_mm=errors_mm)
     left = panels(replace(drawn, traces={"variable": lost}), ["variable"]).axes[0]
-    shown = lines_of(left)[0]
+    _, shown = lines_of(left)[0]
     assert np.flatnonzero(np.isnan(shown)).tolist() == [0, 1, 2]
     assert left.get_ylim()[1] > np.nanmax(shown)
 
