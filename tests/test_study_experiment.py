@@ -1,4 +1,4 @@
-"""The paper's experiment in small: three regions, the real process, all that is written, and going on."""
+"""The paper's experiment in small: two regions, the real process, all that is written, and going on."""
 
 import io
 import json
@@ -17,7 +17,8 @@ from truearm.studies.process import judging, several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
 
-SMALL = ("--regions", "3", "--poses", "16", "--seeds", "2")
+REGIONS, POSES = 2, 12
+SMALL = ("--regions", f"{REGIONS}", "--poses", f"{POSES}", "--seeds", "2")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def test_the_experiment_in_small(small):
     figure = result["figure10"]
     errors = {name: part["workspace"]["mean_mm"] for name, part in figure.items()}
     assert errors["variable"] < errors["conventional"] < 0.5 * errors["uncalibrated"]
-    assert result["session"]["measurements"] + result["session"]["skipped"] >= 48
+    assert result["session"]["measurements"] + result["session"]["skipped"] >= REGIONS * POSES
     assert {each["place"] for each in result["statements"]} >= {"Fig. 10(a)", "Fig. 10(c, d)"}
     page = (directory / "experiment.md").read_text()
     assert all(each["ours"] in page for each in result["statements"])
@@ -92,7 +93,7 @@ def test_another_experiment_does_not_go_on_with_this_session(tmp_path, capsys):
 def test_a_session_of_other_regions_is_left_alone_with_its_cell_file(small, capsys):
     directory, _ = small
     before = {name: (directory / name).read_bytes() for name in ("cell.toml", "experiment.json")}
-    assert main(["study", "experiment", "-o", str(directory), "--regions", "2", "--poses", "16"]) == 1
+    assert main(["study", "experiment", "-o", str(directory), "--regions", "3", "--poses", f"{POSES}"]) == 1
     assert "session.db" in " ".join(capsys.readouterr().err.split())
     assert {name: (directory / name).read_bytes() for name in before} == before
 
@@ -140,7 +141,7 @@ def test_what_the_paper_says_of_its_size_is_not_said_of_another(small):
     agrees = {each["paper"]: each["agrees"] for each in result["statements"]}
     sized = [agrees[said] for said in agrees if "85 regions" in said or "couple of hours" in said]
     assert sized == [None, None]
-    assert "of 3 regions, as measured" in (directory / "experiment.md").read_text()
+    assert f"of {REGIONS} regions, as measured" in (directory / "experiment.md").read_text()
     claimed = {each["claim"] for each in result["claims"]}
     assert "hours of measuring" not in claimed
 

@@ -10,10 +10,11 @@ import pytest
 from truearm.cli import main
 from truearm.defaults import PAPER_FIGURES
 from truearm.errors import UsageError
+from truearm.fits.parameters import ALPHA, THETA, A, D
 from truearm.studies import paper, paper_results, setting
 from truearm.studies.claims import CLAIMS, judged
 from truearm.studies.metrics import over_seeds, quantiles
-from truearm.studies.panels import save_panels
+from truearm.studies.panels import ROWS, TITLES, panels, save_panels
 from truearm.studies.paper import run
 from truearm.studies.paper_results import PaperStudy, conduct_study, save_pictures
 from truearm.studies.statements import STATEMENTS, checked
@@ -100,27 +101,52 @@ def test_every_claim_is_judged_and_stands_in_the_page(study):
         assert entry["claim"] in study.page
 
 
-def test_pictures_are_written_for_print(study, tmp_path):
+def test_pictures_are_written_for_print(study, tmp_path, monkeypatch):
     assert set(study.drawn) == {"figure6", "figure7", "figure8", "noise", "cmac"}
-    few = PaperStudy(study.result, {name: study.drawn[name] for name in ("figure6", "figure8")})
+    monkeypatch.setitem(ROWS, "figure6", ("variable",))
+    few = PaperStudy(study.result, {"figure6": study.drawn["figure6"]})
     files = {path.name for path in save_pictures(few, tmp_path)}
-    stems = ("figure6", "figure8", "division_joint")
-    assert files == {f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")}
-    again = (tmp_path / "figure8.svg").read_bytes()
-    save_panels({"figure8": study.drawn["figure8"]}, tmp_path)
-    assert (tmp_path / "figure8.svg").read_bytes() == again
+    assert files == {
+        f"{stem}.{ending}" for stem in ("figure6", "division_joint") for ending in ("png", "svg")
+    }
+    before = {ending: (tmp_path / f"figure6.{ending}").read_bytes() for ending in ("png", "svg")}
+    assert before["png"].startswith(b"\x89PNG")
+    assert b"variable model (ours)</text>" in before["svg"]
+    save_panels(few.drawn, tmp_path)
+    assert {ending: (tmp_path / f"figure6.{ending}").read_bytes() for ending in before} == before
 
 
-def test_points_that_were_not_reached_leave_gaps_in_pictures(study, tmp_path):
+def lines_of(axes):
+    """Where each line of these axes is drawn: x and y of its points, each (m,)."""
+    return [(np.asarray(line.get_xdata()), np.asarray(line.get_ydata())) for line in axes.lines]
+
+
+def test_panels_show_errors_and_ceps_of_each_scheme_beside_the_gap(study):
+    drawn = study.drawn["figure8"]
+    axes = panels(drawn, ROWS["figure8"]).axes
+    rows = len(ROWS["figure8"])
+    for row, name in enumerate(ROWS["figure8"]):
+        left, right, angles = axes[2 * row], axes[2 * row + 1], axes[2 * rows + row]
+        found = drawn.traces[name]
+        (_, errors), *edges = lines_of(left)
+        np.testing.assert_array_equal(errors, found.size_mm)
+        assert [x[0] for x, _ in edges] == list(drawn.gap)
+        ceps = (found.parameters - drawn.made.identified.table)[:, 1]
+        lengths, turns = ([y for _, y in lines_of(each)[:2]] for each in (right, angles))
+        np.testing.assert_allclose(lengths, 1e3 * ceps[:, [D, A]].T)
+        np.testing.assert_allclose(turns, np.rad2deg(ceps[:, [THETA, ALPHA]]).T)
+        assert TITLES[name] in left.get_title(loc="left")
+
+
+def test_points_that_were_not_reached_leave_gaps_in_pictures(study):
     drawn = study.drawn["figure6"]
-    lost = {}
-    for name, found in drawn.traces.items():
-        errors_mm = found.errors_mm.copy()
-        errors_mm[:3] = np.nan
-        lost[name] = replace(found, errors_mm=errors_mm)
-    (png, svg) = save_panels({"figure6": replace(drawn, traces=lost)}, tmp_path)
-    assert png.stat().st_size > 0
-    assert svg.stat().st_size > 0
+    errors_mm = drawn.traces["variable"].errors_mm.copy()
+    errors_mm[:3] = np.nan
+    lost = replace(drawn.traces["variable"], errors_mm=errors_mm)
+    left = panels(replace(drawn, traces={"variable": lost}), ["variable"]).axes[0]
+    _, shown = lines_of(left)[0]
+    assert np.flatnonzero(np.isnan(shown)).tolist() == [0, 1, 2]
+    assert left.get_ylim()[1] > np.nanmax(shown)
 
 
 def test_the_path_of_figure_7_is_within_reach():

@@ -7,9 +7,18 @@ import truearm as ta
 from truearm._core import Setup
 from truearm.errors import WorkError
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.updating.estimating import MOST_PARTS, Estimate, folds, left_out, posterior, solved, surprise
+from truearm.updating.estimating import (
+    MOST_PARTS,
+    Estimate,
+    folds,
+    left_out,
+    posterior,
+    solved,
+    unexplained,
+)
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Linear, State
+from truearm.updating.unsupported import LINEAR, surprise, unsupported
 
 POSES = MOST_PARTS + 7
 UNKNOWNS = 5
@@ -60,7 +69,8 @@ def test_left_out_residuals_are_predicted_by_their_folds(scene):
 
 def test_surprise_is_the_squared_distance_from_what_all_other_poses_predict(scene):
     linear, covariance, std, free = scene
-    squares, freedom = surprise(estimated(*scene), std, free)
+    poses, squares = surprise(*unexplained(estimated(*scene), std, free), linear.pose)
+    assert poses.tolist() == list(range(POSES))
     scaled = linear.jacobian[:, free] * std[free]
     whole = covariance + scaled @ scaled.T
     value = linear.residual + linear.jacobian[:, free] @ linear.departure[free]
@@ -70,7 +80,49 @@ def test_surprise_is_the_squared_distance_from_what_all_other_poses_predict(scen
         missed = value[own] - gain @ value[rest]
         spread = whole[np.ix_(own, own)] - gain @ whole[np.ix_(rest, own)]
         assert squares[pose] == pytest.approx(missed @ np.linalg.solve(spread, missed), rel=1e-8)
-        assert freedom[pose] == own.sum()
+
+
+def spoilt(scene, reach):
+    """The scene with values of four poses off, two of which hide each other, and unknowns of such a reach."""
+    linear, covariance, std, free = scene
+    residual = linear.residual.copy()
+    for pose, off in ((3, 40.0), (11, -60.0), (12, 25.0), (30, 90.0)):
+        residual[linear.pose == pose] += off
+    spoilt = Linear(residual, linear.jacobian / reach, np.zeros(UNKNOWNS), linear.pose)
+    return spoilt, covariance, std, free
+
+
+def taken_out_one_by_one(linear, covariance, std, free):
+    """Poses that no other supports, all others estimated again without each."""
+    out = list[int]()
+    while True:
+        rest = ~np.isin(linear.pose, out)
+        found = estimated(of_rows(linear, rest), covariance[np.ix_(rest, rest)], std, free)
+        alone = unsupported(found, std, free, 1)
+        if not alone:
+            return out
+        out += alone
+
+
+def test_poses_that_no_other_supports_are_those_found_by_estimating_without_each(scene):
+    linear, covariance, std, free = spoilt(scene, 1e-3 * LINEAR)
+    found = estimated(linear, covariance, std, free)
+    one_by_one = taken_out_one_by_one(linear, covariance, std, free)
+    assert {3, 11, 12, 30} <= set(one_by_one)
+    assert unsupported(found, std, free, POSES) == one_by_one
+    assert unsupported(found, std, free, 2) == one_by_one[:2]
+
+
+def test_where_an_estimate_moves_far_it_is_made_again_before_others_are_judged(scene, monkeypatch):
+    linear, covariance, std, free = spoilt(scene, 1.0)
+    found = estimated(linear, covariance, std, free)
+    (first,) = unsupported(found, std, free, POSES)
+    rest = linear.pose != first
+    alone = solved(of_rows(linear, rest), Scatter(covariance[np.ix_(rest, rest)]), std, free)
+    moved = np.abs(alone - solved(linear, Scatter(covariance), std, free)).max()
+    for share, count in ((0.999, 1), (1.001, 2)):
+        monkeypatch.setattr("truearm.updating.unsupported.LINEAR", share * moved)
+        assert len(unsupported(found, std, free, 2)) == count
 
 
 def test_a_covariance_that_is_none_is_refused_with_the_way_out():

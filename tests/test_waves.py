@@ -18,10 +18,10 @@ JOINT, CYCLES, AMPLITUDE_DEG = 2, 202, 0.01
 
 
 def calibrated(amplitude_deg):
-    """A UR10 whose second drive leaves a wave, by 224 poses."""
+    """A UR10 whose second drive leaves a wave, by 168 poses."""
     errors = (JointError(JOINT, harmonics=(Harmonic(CYCLES, amplitude_deg, 50.0),)),)
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(joint_errors=errors))
-    return ta.calibrate(arm.robot, arm.measure(arm.poses(320)), use="position", refit=False)
+    return ta.calibrate(arm.robot, arm.measure(arm.poses(240)), use="position", refit=False)
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def save_panels(drawn: Mapping[str, Drawn], directory: Path) -> list[Path]:
     files = []
     for name, content in drawn.items():
         with mpl.rc_context(STYLE):
-            files += save_figure(_panels(content, ROWS[name]), directory / name)
+            files += save_figure(panels(content, ROWS[name]), directory / name)
     return files
 
 
@@ -75,8 +75,8 @@ def save_figure(figure: Figure, stem: Path) -> list[Path]:
     return files
 
 
-def _panels(drawn: Drawn, names: Sequence[str]) -> Figure:
-    """Errors on the left, (a) and on; CEPs on the right."""
+def panels(drawn: Drawn, names: Sequence[str]) -> Figure:
+    """The traces of these names, one below the other: errors on the left, (a) and on; CEPs on the right."""
     figure = Figure(figsize=(WIDTH_IN, ROW_IN * len(names) + 0.3), layout="constrained")
     axes = figure.subplots(len(names), 2, sharex=True, squeeze=False)
     letters = iter(ascii_lowercase[len(names) :])

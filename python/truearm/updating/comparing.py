@@ -24,7 +24,7 @@ from truearm.errors import (
     list_names,
 )
 from truearm.fits.core_set import Use, select_fitted
-from truearm.fits.fitted_rows import known_rows, overwhelming
+from truearm.fits.fitted_rows import known_rows
 from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors, mean_distance
 from truearm.lengths import length_mm
@@ -35,7 +35,7 @@ from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.certainty import expected_mm, less_certain
-from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
+from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate
 from truearm.updating.kept_parts import KeptParts
 from truearm.updating.meanwhile import meanwhile
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
@@ -46,6 +46,7 @@ from truearm.updating.scene import Scene, State
 from truearm.updating.some_poses import some_poses
 from truearm.updating.squares import SquaresTest, change_test, rest_test
 from truearm.updating.unknowns import Unknowns
+from truearm.updating.unsupported import unsupported
 from truearm.updating.updated import noted, updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
 
@@ -437,18 +438,19 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
     Where they would be too many, it is not the rows that are wrong: all are kept.
     """
     whole, rows = all_rows.scene, all_rows
+    std, free = whole.unknowns.std, whole.unknowns.free
     kept, out = np.arange(len(whole.data)), list[int]()
-    while len(out) <= MOST_OUTLIERS * len(whole.data):
-        found = estimate(rows.scene, rows.scatter, rows.start, whole.unknowns.free)
-        squares, freedom = surprise(found, whole.unknowns.std, whole.unknowns.free)
-        score = squares / overwhelming(freedom)
-        worst = int(np.argmax(score))
-        if score[worst] <= 1.0:
+    most = int(MOST_OUTLIERS * len(whole.data))
+    while True:
+        found = estimate(rows.scene, rows.scatter, rows.start, free)
+        alone = unsupported(found, std, free, most + 1 - len(out))
+        if not alone:
             return rows, out
-        out.append(int(kept[worst]))
-        kept = np.delete(kept, worst)
+        out += kept[alone].tolist()
+        if len(out) > most:
+            return all_rows, []
+        kept = np.delete(kept, alone)
         rows = _Rows.of(Scene(whole.task, whole.data.select(kept), calibration, whole.unknowns))
-    return all_rows, []
 
 
 def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:

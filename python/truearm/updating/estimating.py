@@ -180,16 +180,3 @@ def unexplained(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, Float
     pulls = precision @ along
     inverse = precision - pulls @ pulls.T
     return inverse, linear.residual + linear.jacobian[:, free] @ linear.departure[free]
-
-
-def surprise(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
-    """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
-    linear = found.linear
-    inverse, residual = unexplained(found, std, free)
-    pull = inverse @ residual
-    poses = np.unique(linear.pose)
-    squares = np.empty(len(poses))
-    for k, pose in enumerate(poses):
-        own = linear.pose == pose
-        squares[k] = pull[own] @ np.linalg.solve(inverse[np.ix_(own, own)], pull[own])
-    return squares, np.array([int((linear.pose == pose).sum()) for pose in poses])

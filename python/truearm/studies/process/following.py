@@ -15,6 +15,8 @@ from truearm.units import MM_PER_METRE, to_si
 Floats = NDArray[np.float64]
 
 STEPS: Final = 12
+SETTLED_M: Final = 1e-9
+"""Commands that move less in a step are as they will be: the controller rounds them far more coarsely."""
 
 
 def followed(made: Experiment, space: CartesianSpace, scheme: Scheme, coordinates: Floats) -> Trace:
@@ -25,12 +27,18 @@ def followed(made: Experiment, space: CartesianSpace, scheme: Scheme, coordinate
     """
     robot, wanted = made.arm.robot, space.points(coordinates)
     chain, origin = scheme_chain(made, scheme), np.asarray(space.origin)
-    off = np.zeros_like(wanted)
+    off, moving = np.zeros_like(wanted), np.arange(len(wanted))
     for _ in range(STEPS):
-        readings, reached = space.readings(wanted - off - origin)
-        values = np.ascontiguousarray(robot.joints_from_readings(readings[reached]))
-        parameters = np.ascontiguousarray(scheme.parameters(readings[reached]))
-        off[reached] = chain.position(values, parameters) - robot.position(readings[reached])
+        if not len(moving):
+            break
+        readings, reached = space.readings(wanted[moving] - off[moving] - origin)
+        readings, moving = readings[reached], moving[reached]
+        values = np.ascontiguousarray(robot.joints_from_readings(readings))
+        parameters = np.ascontiguousarray(scheme.parameters(readings))
+        found = chain.position(values, parameters) - robot.position(readings)
+        moved = np.abs(found - off[moving]).max(axis=1)
+        off[moving] = found
+        moving = moving[moved > SETTLED_M]
     step = to_si(COMMAND_MM, "mm")
     readings, reached = space.readings(np.rint((wanted - off) / step) * step - origin)
     errors, shown = np.full_like(wanted, np.nan), np.full((len(wanted), *made.identified.table.shape), np.nan)

@@ -1,0 +1,118 @@
+"""Poses of an update that no other supports: what was measured there is too unlikely given all the others."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.fits.fitted_rows import overwhelming
+from truearm.updating.estimating import Estimate, unexplained
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Whole = NDArray[np.int64]
+
+LINEAR: Final = 1e-3
+"""Steps of the unknowns, m and rad, over which residuals are linear to about a micrometre."""
+
+
+def unsupported(found: Estimate, std: Floats, free: Mask, most: int) -> list[int]:
+    """Poses of an estimate that no other supports, the worst one first, each judged without those before it.
+
+    Args:
+        found: Of all poses.
+        std: Prior standard deviations of the unknowns (u,), m and rad.
+        free: Which of them were estimated (u,).
+        most: Poses that are looked for.
+
+    Returns:
+        No more than `most`, and none after those without which the estimate moves so far that it has to be
+        made again before others are judged.
+    """
+    left, out = _Left.of(found, std, free), list[int]()
+    while len(out) < most and np.abs(left.moved).max() < LINEAR:
+        pose, score = left.worst()
+        if score <= 1.0:
+            break
+        out.append(pose)
+        left = left.without(pose)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """R values of the poses that are left, linearised at the estimate of all poses.
+
+    Attributes:
+        residual: Without what the unknowns explain (R,).
+        metric: Inverse covariance (R, R) of these.
+        gain: What the unknowns become by them (u, R).
+        pose: Of each value (R,).
+        bound: What the squares of a pose may sum up to, at each number of a pose.
+        moved: How far the estimate of what is left is from that of all (u,).
+    """
+
+    residual: Floats
+    metric: Floats
+    gain: Floats
+    pose: Whole
+    bound: Floats
+    moved: Floats
+
+    @classmethod
+    def of(cls, found: Estimate, std: Floats, free: Mask) -> "_Left":
+        """All poses."""
+        linear = found.linear
+        metric, residual = unexplained(found, std, free)
+        gain = found.covariance @ linear.jacobian.T @ found.scatter.precision
+        bound = overwhelming(np.bincount(linear.pose))
+        return cls(residual, metric, gain, linear.pose, bound, np.zeros(len(gain)))
+
+    def worst(self) -> tuple[int, float]:
+        """The pose that is the most unlikely given all others, and how many times what is allowed for."""
+        poses, squares = surprise(self.metric, self.residual, self.pose)
+        score = squares / self.bound[poses]
+        worst = int(np.argmax(score))
+        return int(poses[worst]), float(score[worst])
+
+    def without(self, pose: int) -> "_Left":
+        """What is left without a pose.
+
+        With P the inverse of a covariance, that of the values other than o is `P - P_o^T P_oo^-1 P_o`.
+        """
+        out = self.pose == pose
+        kept = ~out
+        pull = self.metric[out]
+        taken = np.linalg.solve(pull[:, out], np.column_stack([pull[:, kept], pull @ self.residual]))
+        gain, own = self.gain[:, kept], self.gain[:, out]
+        return _Left(
+            residual=self.residual[kept],
+            metric=self.metric[np.ix_(kept, kept)] - pull[:, kept].T @ taken[:, :-1],
+            gain=gain - own @ taken[:, :-1],
+            pose=self.pose[kept],
+            bound=self.bound,
+            moved=self.moved - own @ taken[:, -1],
+        )
+
+
+def surprise(metric: Floats, residual: Floats, pose: Whole) -> tuple[Whole, Floats]:
+    """How unlikely each pose is given all others.
+
+    Args:
+        metric: Inverse covariance (R, R) of the residuals.
+        residual: (R,).
+        pose: Of each value (R,), ascending.
+
+    Returns:
+        Poses (n,), and of each the squared standardised length (n,) of what the others do not predict.
+    """
+    pull = metric @ residual
+    poses, first, counts = np.unique(pose, return_index=True, return_counts=True)
+    squares = np.empty(len(poses))
+    for count in np.unique(counts):
+        which = counts == count
+        own = first[which, None] + np.arange(count)
+        blocks, pulls = metric[own[:, :, None], own[:, None, :]], pull[own]
+        squares[which] = (pulls * np.linalg.solve(blocks, pulls[:, :, None])[:, :, 0]).sum(axis=1)
+    return poses, squares
