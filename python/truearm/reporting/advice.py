@@ -22,6 +22,7 @@ from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
+from truearm.fits.identifiability import BASE, SETUP
 from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
@@ -42,7 +43,6 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
-SETUP_WORDS: Final = "the place of device or target"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Advice:
 def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
     found = [advice for rule in _rules(facts) for advice in rule(facts)]
-    if known is not None and not facts.is_of_no_help:
+    if known is not None and not (facts.is_of_no_help or facts.undecided):
         found += _where(facts, known)
     return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
 
@@ -93,6 +93,14 @@ def _checks(facts: Facts) -> Iterator[Advice]:
         return
     words = to_check(NO_OUTLIERS if any(_would_fit(facts)) else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
+
+
+def _undecided(facts: Facts) -> Iterator[Advice]:
+    words = (
+        f"{facts.undecided}: an error like that of the nominal model may be chance. Do not use it before it "
+        "was judged on more."
+    )
+    yield Advice("more_poses", "Measure more poses.", words, 20.0 * facts.mean_mm())
 
 
 def _outliers(facts: Facts) -> Iterator[Advice]:
@@ -297,8 +305,9 @@ def _range(facts: Facts, weak: Stretch) -> str:
 def _unseen(facts: Facts) -> Iterator[Advice]:
     found, selection = facts.calibration.identifiability, facts.calibration.selection
     pairs = zip(found.undetermined, found.words, strict=True)
-    of_target, lever = taken_over(facts), target_lever_mm(facts)
-    hidden = [name for name, words in pairs if SETUP_WORDS not in words and name not in of_target]
+    lever = target_lever_mm(facts)
+    harmless = {name for name, words in pairs if SETUP in words or BASE in words} | taken_over(facts)
+    hidden = [name for name in found.undetermined if name not in harmless]
     if hidden:
         is_on = lever is not None and lever < ON_THE_AXIS_MM
         more = ", and a target mounted off the last axis," if is_on else ""
@@ -397,10 +406,16 @@ RULES: Final = (
 )
 RULES_OF_UPDATES: Final = (_would_fit, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
 RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
+RULES_UNDECIDED: Final = (_undecided, _outliers, _stood_still, _few_held)
 
 
 def _rules(facts: Facts) -> tuple[Callable[[Facts], Iterator[Advice]], ...]:
-    """The rules that hold for a calibration: one that does not help tells nothing of noise or of the arm."""
+    """The rules that hold for a calibration.
+
+    One that does not help tells nothing of noise or of the arm, nor does one of which nothing is known yet.
+    """
     if facts.update is not None:
         return RULES_OF_UPDATES
+    if facts.undecided:
+        return RULES_UNDECIDED
     return RULES_WITHOUT_HELP if facts.is_of_no_help else RULES

@@ -71,6 +71,8 @@ def verdict(facts: Facts) -> str:
             start, why = gains_nothing(facts.best)
             return f"{said} {start}. {why}"
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
+    if facts.undecided:
+        return f"{said} So few do not tell whether the calibration helps: measure more poses."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
     return f"{said}{_changed(facts)}"
@@ -105,6 +107,8 @@ def _former(facts: Facts) -> str:
 def tone(facts: Facts) -> Tone:
     """How good that is."""
     before, after = facts.mean_mm(NOMINAL), facts.mean_mm()
+    if facts.undecided:
+        return "fair"
     if facts.is_spoilt_by_rows or not helps(before, after):
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
