@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.cli.calibrate import suggest_next
 from truearm.doubts.few_judged import UNDECIDED, FewJudged
 from truearm.doubts.of_results import LARGE_MM, NO_HELP, ROWS_SHIFTED
@@ -63,6 +64,11 @@ def test_a_report_on_few_poses_asks_for_more_and_not_for_mistakes(fifteen):
     assert made.verdict.endswith("So few do not tell whether the calibration helps: measure more poses.")
     assert [advice.kind for advice in made.advice] == ["more_poses", "few_held_out"]
     assert 'class="verdict fair"' in made.html
+
+
+def test_what_constants_are_not_asked_is_no_automatic_option(fifteen):
+    page = words_of(report(fifteen).html)
+    assert "movement of set-ups while measuring taken out not looked for" in page
 
 
 def test_what_comes_next_judges_it_on_others_and_corrects_nothing(fifteen, tmp_path, capsys):

@@ -149,17 +149,19 @@ def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads:
 
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
-    """Name the commands that come next: none that uses a calibration that does not help.
+    """Name the commands that come next: none that uses a calibration that does not help, or of which
+    something slipped while it was measured.
 
     Where compensation would refuse most measured rows, it is said why, and which option allows them.
     """
+    from truearm.doubts.at_once import AT_ONCE
     from truearm.doubts.few_judged import UNDECIDED
     from truearm.doubts.of_results import OF_NO_USE, ORIENTATION_MISFIT
     from truearm.reporting.facts import Facts
 
     evaluate = [] if calibration.selection.distances else [f"truearm evaluate {typed(file)} OTHER.csv"]
     kinds = {notice.kind for notice in calibration.notices}
-    if kinds & {*OF_NO_USE, UNDECIDED, ORIENTATION_MISFIT}:
+    if kinds & {*OF_NO_USE, *AT_ONCE, UNDECIDED, ORIENTATION_MISFIT}:
         suggest(f"truearm report {typed(file)}", *(evaluate if UNDECIDED in kinds else []))
         return
     facts = Facts(calibration)

@@ -1,11 +1,12 @@
 """What would help most next, decided by rules from the data."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from truearm.doubts.at_once import AT_ONCE
 from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.of_results import (
@@ -71,8 +72,14 @@ def advise(facts: Facts, known: Known | None) -> list[Advice]:
 
 
 def _would_fit(facts: Facts) -> Iterator[Advice]:
-    for words in filter(None, map(facts.noticed, WOULD_FIT)):
+    kinds = (kind for kind in WOULD_FIT if kind not in AT_ONCE)
+    for words in filter(None, map(facts.noticed, kinds)):
         yield Advice("would_fit", "Correct what does not fit.", words, np.inf)
+
+
+def _gave_way(facts: Facts) -> Iterator[Advice]:
+    for words in filter(None, map(facts.noticed, AT_ONCE)):
+        yield Advice("gave_way", "Find what gave way.", words, np.inf)
 
 
 def _exchanged(facts: Facts) -> Iterator[Advice]:
@@ -91,7 +98,8 @@ def _refused(facts: Facts) -> Iterator[Advice]:
 def _checks(facts: Facts) -> Iterator[Advice]:
     if any(_exchanged(facts)) or facts.noticed(STATED_TOO_LARGE):
         return
-    words = to_check(NO_OUTLIERS if any(_would_fit(facts)) else facts.outliers)
+    has_reason = any(map(facts.noticed, WOULD_FIT))
+    words = to_check(NO_OUTLIERS if has_reason else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
 
 
@@ -112,10 +120,11 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     named = [f"{entry['row']}{of_file[entry['file']]}" for entry in outliers[:ROWS_NAMED]]
     named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
+    sizes = _as_judged(facts, outliers)
     largest = [
-        f"{short(max(entry[name] for entry in outliers if name in entry))[0]} {unit}"
+        f"{short(max(entry[name] for entry in sizes if name in entry))[0]} {unit}"
         for name, unit in (("distance_mm", "mm"), ("turn_mrad", "mrad"))
-        if any(name in entry for entry in outliers)
+        if any(name in entry for entry in sizes)
     ]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
@@ -124,6 +133,15 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
         "interrupted beam, a loose target, or an arm that had not settled."
     )
     yield Advice("outliers", "Check the outliers.", words, facts.mean_mm() + share)
+
+
+def _as_judged(facts: Facts, outliers: list[dict[str, Any]]) -> list[Mapping[str, Any]]:
+    """The outliers with what was missed there before they were seen, of those that were held out, as the
+    verdict has them; with what the fit leaves of the others.
+    """
+    judged = [] if facts.held is None else facts.held.among(outliers, facts.best)
+    named = {(entry["file"], entry["row"]): entry for entry in judged}
+    return [named.get((entry["file"], entry["row"]), entry) for entry in outliers]
 
 
 def _no_longer_fits(facts: Facts) -> Iterator[Advice]:
@@ -167,13 +185,13 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         return
     trained = facts.calibration.validation.poses_trained
     unsure = (
-        f", though so few poses as {trained} hardly tell it from the rest"
+        ", though so few poses hardly tell noise from what the model misses"
         if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE
         else ""
     )
     words = (
-        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm{unsure}. The rest is "
-        f"what {trained} leave undetermined. Poses like those of the task help most."
+        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm{unsure}. What is more "
+        f"than noise is what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -374,15 +392,21 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         yield Advice(CONSTANT_BETTER, "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
+        against = (
+            f"the same {facts.mean_error} of {left} mm as constant parameters"
+            if left == before
+            else f"a {facts.mean_error} of {left} mm against {before} mm with constant parameters"
+        )
         words = (
-            f"The variable model gains little or nothing: a {facts.mean_error} of {left} mm against {before} "
-            "mm with constant parameters. They hardly vary, or the poses are too few to show it."
+            f"The variable model gains little or nothing: {against}. They hardly vary, or the poses are too "
+            "few to show it."
         )
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 
 
 RULES: Final = (
     _would_fit,
+    _gave_way,
     _exchanged,
     _refused,
     _outliers,
@@ -404,8 +428,8 @@ RULES: Final = (
     _intervals,
     _what_varies,
 )
-RULES_OF_UPDATES: Final = (_would_fit, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
-RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
+RULES_OF_UPDATES: Final = (_would_fit, _gave_way, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
+RULES_WITHOUT_HELP: Final = (_would_fit, _gave_way, _exchanged, _checks, _stood_still)
 RULES_UNDECIDED: Final = (_undecided, _outliers, _stood_still, _few_held)
 
 
