@@ -86,9 +86,10 @@ def test_orientations_are_told_without_the_outlier_too():
     table = arm.measure_table(arm.poses(50), orientation=True)
     held = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant").held
     assert held is not None
-    turned = matrix_from_quaternion(table.loc[[held.rows[2] - 1], [*QUATERNION]].to_numpy())
+    row = int(held.rows[2]) - 1
+    turned = matrix_from_quaternion(table.loc[[row], [*QUATERNION]].to_numpy())
     turned = turned @ matrix_from_rotation_vector(np.array([0.0, 0.0, 0.1]))
-    table.loc[held.rows[2] - 1, [*QUATERNION]] = quaternion_from_matrix(turned)[0]
+    table.loc[row, [*QUATERNION]] = quaternion_from_matrix(turned)[0]
     found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
     turns = Facts(found).outliers.means_mrad
     mean, former = short(turns["constant"], turns["nominal"])
@@ -99,8 +100,9 @@ def test_orientations_are_told_without_the_outlier_too():
     assert f"orientation error without them is {mean} mrad, with the nominal model {former}" in made.verdict
     assert "mean orientation error without the outliers among them" in words_of(made.html)
     says = next(says for title, says in made.figures if "orientation errors" in title)
-    best = held.without(found.summary["outliers"])
-    turn = 1e3 * found.held.errors["constant"].turn_rad[best]
+    assert found.held is not None
+    kept = found.held.without(found.summary["outliers"])
+    turn = 1e3 * found.held.errors["constant"].turn_rad[kept]
     (bound,) = re.findall(r"without the outliers below .* and (\S+) mrad \(constant\)", says)
     assert float(bound) == pytest.approx(np.quantile(turn, 0.95), rel=0.05)
 
