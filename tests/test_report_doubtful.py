@@ -66,9 +66,9 @@ def test_errors_without_held_out_outliers_stand_beside_those_with_them(with_an_o
     largest = f"{calibration.validation.holdout['variable'].position.max:.2f} mm"
     assert f"Without the outliers among them, row {row} ({largest})" in made.verdict
     assert entry["distance_mm"] != pytest.approx(calibration.validation.holdout["variable"].position.max)
-    (told,) = (advice.words for advice in made.advice if advice.kind == "outliers")
+    (advised,) = (advice.words for advice in made.advice if advice.kind == "outliers")
     worst = calibration.held.errors["variable"].distance_m.max()
-    assert f"up to {short(1e3 * worst)[0]} mm off" in told
+    assert f"up to {short(1e3 * worst)[0]} mm off" in advised
     assert mean in made.verdict.partition("Without")[2]
     assert "mean error without the outliers among them; with the nominal model" in words_of(made.html)
     in_space = next(says for title, says in made.figures if title.startswith("Errors in space"))
