@@ -244,6 +244,16 @@ def test_a_log_gets_plain_lines_and_no_bar(capfd, monkeypatch):
     assert re.fullmatch(r"Something slow ... \d+ s\n", capfd.readouterr().err)
 
 
+def test_a_log_is_not_told_the_same_again(capfd, monkeypatch):
+    monkeypatch.setattr("truearm.cli.display.PATIENCE_S", 0.01)
+    monkeypatch.setattr("truearm.cli.display.IN_LOG_S", 0.02)
+    with told_stages()("something slow"):
+        time.sleep(0.3)
+    lines = capfd.readouterr().err.splitlines()
+    assert lines
+    assert len(lines) == len(set(lines))
+
+
 def shown():
     return None if DISPLAY.current is None else DISPLAY.current.text
 

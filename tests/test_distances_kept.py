@@ -10,6 +10,7 @@ import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm.cli import main
 from truearm.doubts.points_together import points_together
+from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 from truearm.storage.calibration_file import NO_DIGEST
 
@@ -93,3 +94,25 @@ def test_distances_beside_points_change_nothing_and_are_told():
     assert [len(data) for data, _ in made.values()] == [40, 40, 40]
     assert made["empty"][0].hash() == made["without"][0].hash()
     assert [told for _, told in made.values()] == [[], [], ["distances_left_out"]]
+
+
+def test_what_moves_the_whole_arm_is_no_matter_of_poses_to_pairs(from_pairs):
+    """theta1 and d1 change no distance between two points of the arm, whatever the poses."""
+    told = dict(zip(from_pairs.identifiability.undetermined, from_pairs.identifiability.words, strict=True))
+    for name in ("theta1", "d1"):
+        assert told[name] == f"{name} cannot be distinguished from the place of the base."
+    assert "unseen_parameters" not in [advice.kind for advice in report(from_pairs).advice]
+
+
+def test_pairs_of_poses_that_hardly_differ_ask_for_larger_motions(pairs):
+    """A joint that stands still is told from nothing else, and that poses would cure."""
+    arm = VirtualArm(IRB, seed=3)
+    q = arm.poses(2 * PAIRS)
+    q[:, 3] = 0.4
+    points = arm.measure_table(q)[["x", "y", "z"]].to_numpy()
+    apart = np.tile(np.linalg.norm(points[:PAIRS] - points[PAIRS:], axis=1), 2)
+    still = pairs.assign(distance=apart, **{f"q{k + 1}": q[:, k] for k in range(6)})
+    found = ta.calibrate(IRB, ta.Measurements.from_dataframe(still), model="constant", refit=False)
+    (told,) = [each.words for each in report(found).advice if each.kind == "unseen_parameters"]
+    assert "theta1" not in told
+    assert "theta6" not in told

@@ -306,10 +306,15 @@ def test_reasons(changed, limits, kinds):
 
 
 @pytest.mark.parametrize(
-    ("floor", "said"), [(1.6, "There is nothing to gain"), (0.05, "The calibration does not help")]
+    ("floor", "undecided", "said"),
+    [
+        (1.6, "", "There is nothing to gain"),
+        (0.05, "", "The calibration does not help"),
+        (0.05, "5 held-out poses do not tell", "5 held-out poses do not tell"),
+    ],
 )
-def test_an_arm_whose_errors_hide_in_noise_has_nothing_to_gain(floor, said):
-    row = {**ROW, "nominal_mean_mm": 1.69, "mean_mm": 1.7, "floor_mm": floor}
+def test_an_arm_that_does_not_gain_is_told_why(floor, undecided, said):
+    row = {**ROW, "nominal_mean_mm": 1.69, "mean_mm": 1.7, "floor_mm": floor, "undecided": undecided}
     (found,) = reasons(row, [row], LimitsSection())
     assert found.words.startswith(said)
 

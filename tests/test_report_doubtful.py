@@ -1,13 +1,19 @@
 """The report of a calibration that is wrong, or whose errors are those of a few rows."""
 
+import re
+
 import numpy as np
 import pytest
 
 import truearm as ta
 from tests.report_support import words_of
 from truearm.exporting import export
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import short
 from truearm.reporting.report import report
+from truearm.rotations import matrix_from_quaternion, matrix_from_rotation_vector, quaternion_from_matrix
 from truearm.simulation import VirtualArm
+from truearm.tables.columns import QUATERNION
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +66,9 @@ def test_errors_without_held_out_outliers_stand_beside_those_with_them(with_an_o
     largest = f"{calibration.validation.holdout['variable'].position.max:.2f} mm"
     assert f"Without the outliers among them, row {row} ({largest})" in made.verdict
     assert entry["distance_mm"] != pytest.approx(calibration.validation.holdout["variable"].position.max)
+    (advised,) = (advice.words for advice in made.advice if advice.kind == "outliers")
+    worst = calibration.held.errors["variable"].distance_m.max()
+    assert f"up to {short(1e3 * worst)[0]} mm off" in advised
     assert mean in made.verdict.partition("Without")[2]
     assert "mean error without the outliers among them; with the nominal model" in words_of(made.html)
     in_space = next(says for title, says in made.figures if title.startswith("Errors in space"))
@@ -69,6 +78,33 @@ def test_errors_without_held_out_outliers_stand_beside_those_with_them(with_an_o
     told = [advice.words for advice in made.advice if advice.kind in ("noise_floor", "more_poses")]
     assert told
     assert all(words.startswith(f"The mean error without the outliers is {mean}") for words in told)
+
+
+def test_orientations_are_told_without_the_outlier_too():
+    """One flange that was noted turned hides what a calibration gains."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(50), orientation=True)
+    held = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant").held
+    assert held is not None
+    row = int(held.rows[2]) - 1
+    turned = matrix_from_quaternion(table.loc[[row], [*QUATERNION]].to_numpy())
+    turned = turned @ matrix_from_rotation_vector(np.array([0.0, 0.0, 0.1]))
+    table.loc[row, [*QUATERNION]] = quaternion_from_matrix(turned)[0]
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    turns = Facts(found).outliers.means_mrad
+    mean, former = short(turns["constant"], turns["nominal"])
+    with_it = found.validation.holdout["constant"].orientation
+    assert with_it is not None
+    assert turns["constant"] < 0.3 * with_it.mean
+    made = report(found)
+    assert f"orientation error without them is {mean} mrad, with the nominal model {former}" in made.verdict
+    assert "mean orientation error without the outliers among them" in words_of(made.html)
+    says = next(says for title, says in made.figures if "orientation errors" in title)
+    assert found.held is not None
+    kept = found.held.without(found.summary["outliers"])
+    turn = 1e3 * found.held.errors["constant"].turn_rad[kept]
+    (bound,) = re.findall(r"without the outliers below .* and (\S+) mrad \(constant\)", says)
+    assert float(bound) == pytest.approx(np.quantile(turn, 0.95), rel=0.05)
 
 
 def test_an_export_says_what_it_loses_without_the_outliers_too(with_an_outlier):

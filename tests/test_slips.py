@@ -9,6 +9,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli import update as of_command
+from truearm.cli.calibrate import suggest_next
 from truearm.doubts.at_once import (
     JOINT,
     JOINT_MOVED,
@@ -27,6 +28,7 @@ from truearm.programs.notices import update_notices
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
 from truearm.reporting.since_update import since_update
+from truearm.reporting.verdict import cards
 from truearm.rotations import (
     matrix_from_quaternion,
     matrix_from_rotation_vector,
@@ -104,7 +106,15 @@ def test_of_several_targets_the_one_that_slips_has_the_number_of_its_columns(arm
 def test_the_report_puts_it_first_and_advises_no_more_poses(slipped):
     advice = advise(Facts(slipped[0]), None)
     assert slipped[1][TARGET_SLIPPED] in advice[0].words
+    assert advice[0].name == "Find what gave way."
     assert not {"more_poses", "constant_suffices"} & {each.kind for each in advice}
+
+
+def test_noise_that_holds_a_slip_is_not_told_and_nothing_is_corrected_by_it(slipped, tmp_path, capsys):
+    shown = " ".join(card.label for card in cards(Facts(slipped[0])))
+    assert "noise alone would leave" not in shown
+    suggest_next(slipped[0], tmp_path / "arm.calib")
+    assert "truearm compensate" not in capsys.readouterr().out
 
 
 def test_rows_behind_in_a_group_of_their_own_are_right(arm, steady, slipped):

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.cell.proposed import ProposalOptions, kept_still, propose_acceptance
 from truearm.cli import main
-from truearm.fits.stillness import moved_joints, still_joints, still_words
+from truearm.fits.stillness import moved_joints, still_joints, still_warning, still_words
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
 from truearm.rotations import matrix_from_quaternion
@@ -76,7 +77,16 @@ def test_one_held_out_row_is_enough_for_a_report(tmp_path, monkeypatch):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
     arm.measure_table(arm.poses(20)).to_csv("arm.csv", index=False)
     assert main(["calibrate", "ur10", "arm.csv", "-o", "out", "--holdout", "0.05"]) == 0
-    assert (tmp_path / "out" / "report.html").exists()
+    page = words_of((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert "held-out poses have a smaller error" not in page
+    assert "% of the held-out coordinates" not in page
+
+
+def test_joints_that_stood_still_are_several():
+    readings = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.ones(5)])
+    told = still_warning(readings, ("revolute",) * 3)
+    assert "What they change looks like" in told
+    assert "poses in which they move" in told
 
 
 def test_an_outlier_at_the_second_target_is_told_with_its_distance():

@@ -19,6 +19,7 @@ from truearm.doubts.as_calibrated import (
     changed_since,
     not_as_calibrated,
 )
+from truearm.doubts.few_judged import UNDECIDED, FewJudged
 from truearm.doubts.gross_rows import (
     FAR_ROWS,
     Expected,
@@ -300,9 +301,12 @@ def _setup(
 def _of_no_use(calibration: Calibration, held: HeldRows, changed: list[Notice]) -> list[Notice]:
     """A warning where the calibration does not help, with what was `changed` if it did before."""
     best, floor_mm = calibration.model_name, distance_at_floor_mm(calibration)
-    what = "median error on the rows that were judged"
-    told = no_help(held.median_mm(NOMINAL), held.median_mm(best), what, floor_mm, best=best)
-    return told and (changed_since(calibration, changed, held) or told)
+    before_mm, after_mm, what = held.median_mm(NOMINAL), held.median_mm(best), "median error"
+    told = no_help(before_mm, after_mm, f"{what} on the rows that were judged", floor_mm, best=best)
+    poses = len(np.unique(pose_numbers(held.readings, held.sources)))
+    told = FewJudged(held, poses, "judged", best).told(told, before_mm, after_mm, what)
+    since = changed_since(calibration, changed, held) if told else []
+    return since or (changed if any(notice.kind == UNDECIDED for notice in told) else []) or told
 
 
 def _moved(
@@ -318,7 +322,7 @@ def _moved(
         return []
     best = calibration.model_name
     known_mm, misses = known_mean_mm(calibration), {notice.kind for notice in anew.notices}
-    if anew.rows is None or known_mm is None or {NO_HELP, FAR_ROWS} & misses:
+    if anew.rows is None or known_mm is None or {NO_HELP, UNDECIDED, FAR_ROWS} & misses:
         return []
     after_mm = anew.rows.median_mm(best)
     fits = NOT_AS_CALIBRATED not in misses and after_mm <= AS_KNOWN * known_mm

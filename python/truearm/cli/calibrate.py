@@ -151,15 +151,20 @@ def _calibrated(
 
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
-    """Name the commands that come next: none that uses a calibration that does not help.
+    """Name the commands that come next: none that uses a calibration that does not help, or of which
+    something slipped while it was measured.
 
     Where compensation would refuse most measured rows, it is said why, and which option allows them.
     """
+    from truearm.doubts.at_once import STEP_KINDS
+    from truearm.doubts.few_judged import UNDECIDED
     from truearm.doubts.of_results import OF_NO_USE, ORIENTATION_MISFIT
     from truearm.reporting.facts import Facts
 
-    if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
-        suggest(f"truearm report {typed(file)}")
+    evaluate = [] if calibration.selection.distances else [f"truearm evaluate {typed(file)} OTHER.csv"]
+    kinds = {notice.kind for notice in calibration.notices}
+    if kinds & {*OF_NO_USE, *STEP_KINDS, UNDECIDED, ORIENTATION_MISFIT}:
+        suggest(f"truearm report {typed(file)}", *(evaluate if UNDECIDED in kinds else []))
         return
     facts = Facts(calibration)
     if facts.mostly_refused:
@@ -169,7 +174,7 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
     if calibration.selection.distances:
         suggest(*compensate, f"truearm export {typed(file)} --to dh-toml -o arm.toml")
     else:
-        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate)
+        suggest(*evaluate, *compensate)
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:

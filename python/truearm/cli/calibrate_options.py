@@ -45,7 +45,8 @@ Drift: TypeAlias = Annotated[
     str,
     typer.Option(
         metavar="auto|none",
-        help="Whether to take out how set-ups moved while they were measured, row by row.",
+        help="Whether to take out how set-ups moved while they were measured, row by row; only the variable "
+        "model looks for it.",
     ),
 ]
 Features: TypeAlias = Annotated[

@@ -169,10 +169,13 @@ class Display:
             self._tell_until(ended)
 
     def _tell_until(self, ended: threading.Event) -> None:
+        last = ""
         while True:
             work = self.current
-            if work is not None:
-                tell(f"{_capital(work.text)} ... {', '.join(work.words)}")
+            line = "" if work is None else f"{_capital(work.text)} ... {', '.join(work.words)}"
+            if line and line != last:
+                tell(line)
+                last = line
             if ended.wait(IN_LOG_S):
                 return
 

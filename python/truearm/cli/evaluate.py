@@ -100,6 +100,7 @@ def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update
     """What to do with a calibration that was judged: `update` it where the arm is not as it was."""
     from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
     from truearm.doubts.at_once import STEP_KINDS
+    from truearm.doubts.few_judged import UNDECIDED
     from truearm.doubts.gross_rows import FAR_ROWS
     from truearm.doubts.of_results import OF_NO_USE
 
@@ -108,4 +109,4 @@ def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update
         return []
     if NOT_AS_CALIBRATED in kinds:
         return [update] if can_be_updated(known) else []
-    return [] if kinds & {*OF_NO_USE, FAR_ROWS} else compensate_commands(known, file)
+    return [] if kinds & {*OF_NO_USE, UNDECIDED, FAR_ROWS} else compensate_commands(known, file)

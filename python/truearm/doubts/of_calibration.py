@@ -13,6 +13,7 @@ from truearm.defaults import NO_DRIFT
 from truearm.doubts.conventions import BETTER, NEAR_M, fits_otherwise
 from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
+from truearm.doubts.few_judged import FewJudged
 from truearm.doubts.known_world import another_frame
 from truearm.doubts.moved_joints import moved_joints
 from truearm.doubts.of_results import (
@@ -26,7 +27,7 @@ from truearm.doubts.of_results import (
     poses_aside,
     stated_too_large,
 )
-from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers
+from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers, judged_means_mm
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
 from truearm.doubts.slips import Slip, main_slips, slips
@@ -103,8 +104,16 @@ def of_result(
     told, robust = _doubted(task, found, data, stages)
     kinds = {notice.kind for notice in told}
     if kinds & WRONG_ROWS:
-        return told if kinds & REASONS else [*told, *_reason(task, found, progress)]
+        return _unless_chance(found, told if kinds & REASONS else [*told, *_reason(task, found, progress)])
     return [*told, *_of_left(task, found, progress, robust)]
+
+
+def _unless_chance(found: Calibration, told: list[Notice]) -> list[Notice]:
+    """What speaks against a calibration, where so few poses were held out that they may be to blame."""
+    judged, best, outliers = found.validation, found.model_name, Outliers.of(found)
+    means = judged_means_mm(judged, outliers)
+    few = FewJudged(found.held, judged.n_holdout_poses, judged.judged, best, outliers)
+    return few.told(told, means[NOMINAL], means[best], "mean error")
 
 
 def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | None) -> list[Notice]:

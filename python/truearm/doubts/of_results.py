@@ -331,7 +331,7 @@ def no_help(
         if outliers.stated_too_large:
             start, why = "The calibration gains nothing", SIGMA_FIRST
         elif outliers.named and outliers.fate == FULL_WEIGHT:
-            start, why = "The calibration gains nothing", _these_first(outliers)
+            start, why = "The calibration gains nothing", these_first(outliers)
         elif before_mm >= NEAR_MM and not leaves_noise(best):
             start, why = gains_nothing(best)
         elif before_mm >= NEAR_MM:
@@ -370,10 +370,11 @@ def to_check(outliers: Outliers) -> str:
         return SIGMA_FIRST
     if outliers.exchanged:
         return "Put right first what is exchanged, or leave it out, and calibrate again."
-    return f"{CHECKS}." if not outliers.named else f"{_these_first(outliers)} {CHECKS}."
+    return f"{CHECKS}." if not outliers.named else f"{these_first(outliers)} {CHECKS}."
 
 
-def _these_first(outliers: Outliers) -> str:
+def these_first(outliers: Outliers) -> str:
+    """That rows which are far off are to be looked at before anything else."""
     robust = ", and --robust cauchy gives hardly any weight" if outliers.fate == FULL_WEIGHT else ""
     return f"Look at these rows first, which alone may spoil the fit{robust}: {outliers.named}."
 
@@ -431,7 +432,7 @@ def _turns_otherwise(validation: Validation, best: str, outliers: Outliers) -> l
         )
         return [Notice(SINGLE_ROWS, text)]
     turned_most = max((entry.get("turn_mrad", 0.0) for entry in outliers.entries), default=0.0)
-    first = f"{_these_first(outliers)} " if turned_most > LARGE_MRAD else ""
+    first = f"{these_first(outliers)} " if turned_most > LARGE_MRAD else ""
     text = (
         f"Orientations do not fit the arm: their mean error on {validation.judged} rows is "
         f"{turned.mean:.4g} mrad. {first}"

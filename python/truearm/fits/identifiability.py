@@ -6,8 +6,13 @@ from typing import Any, Final
 
 from truearm._core import MeasurementSet, Problem, Setup, identifiability
 from truearm.fits.identified import IdentifiedArm
+from truearm.fits.parameters import KIND_COUNT, THETA, D
 
 MAX_NAMED: Final = 4
+SETUP: Final = "the place of device or target"
+BASE: Final = "the place of the base"
+IN_FRONT_OF_ITS_JOINT: Final = {"standard": (THETA, D), "modified": tuple(range(KIND_COUNT))}
+"""Kinds of a row that move all that its joint carries alike, whatever its reading."""
 Confounded = tuple[int, Sequence[tuple[int, float]], bool]
 
 
@@ -62,24 +67,34 @@ def identify(arm: IdentifiedArm, measured: MeasurementSet, setup: Setup) -> Iden
     columns = [arm.candidates.columns[k] for k in wanted]
     names = [arm.candidates.names[k] for k in wanted]
     problem = Problem(arm.flange_chain, measured, columns, arm.world_is_known)
+    of_base = [not arm.world_is_known and _moves_all_alike(arm, column) for column in columns]
     determined, undetermined, total_rank, condition = identifiability(problem, arm.table, setup)
     return Identifiability(
         parameters=len(columns),
         determined=tuple(names[k] for k in determined),
         undetermined=tuple(names[k] for k, _, _ in undetermined),
-        words=tuple(_sentence(names, entry) for entry in undetermined),
+        words=tuple(_sentence(names, entry, of_base=of_base[entry[0]]) for entry in undetermined),
         total_rank=total_rank,
         condition=condition,
     )
 
 
-def _sentence(names: Sequence[str], entry: Confounded) -> str:
+def _moves_all_alike(arm: IdentifiedArm, column: int) -> bool:
+    """Whether a parameter is of the base or stands in front of the first joint: it moves the whole arm, which
+    distances between its own points do not see.
+    """
+    row, kind = divmod(column, KIND_COUNT)
+    return row == 0 or (row == 1 and kind in IN_FRONT_OF_ITS_JOINT[arm.robot.convention])
+
+
+def _sentence(names: Sequence[str], entry: Confounded, *, of_base: bool) -> str:
     index, parts, with_setup = entry
     largest = sorted(parts, key=lambda part: -abs(part[1]))
     others = [names[k] for k, _ in largest]
     if not others and not with_setup:
-        return f"{names[index]} hardly affected what was measured."
-    setup = ["the place of device or target"] if with_setup else []
+        unseen = f"cannot be distinguished from {BASE}" if of_base else "hardly affected what was measured"
+        return f"{names[index]} {unseen}."
+    setup = [SETUP] if with_setup else []
     named = others[: MAX_NAMED - len(setup)] + setup
     told = " and ".join(part for part in (", ".join(named[:-1]), named[-1]) if part)
     return f"{names[index]} cannot be distinguished from {told}."

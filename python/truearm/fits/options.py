@@ -40,7 +40,7 @@ class CalibrationOptions:
         model: "variable", "constant" for that alone, or a scheme of the paper: "regions", "cmac", "fcmac".
         robust: Loss of the constant fit.
         drift: "auto" to take out how set-ups moved while they were measured, where the rows show that they
-            did; "none" to leave it in.
+            did; "none" to leave it in. Only with model "variable" is it looked for.
         refit: Whether the calibration is fitted to all rows after validation.
         features: Columns that the field depends on beside the joints.
         frame: "free" for an unknown world_from_base of each set-up; "world" for none and a base that is

@@ -15,11 +15,6 @@ STILL_DEG: Final = 0.5
 STILL_MM: Final = 0.5
 CARRIED: Final = 1e-3
 """Degrees or millimetres by which readings differ that are one place."""
-MOVE_IT: Final = (
-    "What it changes looks like the place of the target, or like another joint, and no standard deviation "
-    "knows of it. Measure poses in which it moves, over all of the range that the work needs"
-)
-"""Why that matters, and the way out."""
 
 
 def still_joints(readings: Floats, joints: Sequence[str]) -> dict[int, float]:
@@ -67,4 +62,11 @@ def still_words(still: Mapping[int, float], joints: Sequence[str], at: str = "at
 def still_warning(readings: Floats, joints: Sequence[str]) -> str:
     """What is to be known where joints stood still in readings (n, N), and what to do; empty if none did."""
     still = still_joints(readings, joints)
-    return f"All poses were measured with {still_words(still, joints)}. {MOVE_IT}." if still else ""
+    if not still:
+        return ""
+    change, move = ("it changes", "it moves") if len(still) == 1 else ("they change", "they move")
+    return (
+        f"All poses were measured with {still_words(still, joints)}. What {change} looks like the place of "
+        "the target, or like another joint, and no standard deviation knows of it. Measure poses in which "
+        f"{move}, over all of the range that the work needs."
+    )

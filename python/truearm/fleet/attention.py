@@ -103,7 +103,9 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 
 def _no_gain(arm: Row) -> Iterator[Reason]:
     before, after = _mean_mm(arm, "nominal_"), _mean_mm(arm)
-    if not helps(before, after):
+    if undecided := arm.get("undecided"):
+        yield Reason("no_gain", undecided, after / before)
+    elif not helps(before, after):
         none = nothing_to_gain(before, after, arm["floor_mm"])
         said = "There is nothing to gain" if none else "The calibration does not help"
         far = arm.get("outliers_named", "")

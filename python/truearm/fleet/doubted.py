@@ -4,6 +4,7 @@ from typing import Final
 
 from truearm.calibrating import REFIT_ASTRAY
 from truearm.calibration import Calibration
+from truearm.doubts.few_judged import UNDECIDED
 from truearm.doubts.held_tool import never_turns_freely
 from truearm.doubts.of_calibration import OPEN_SETUP
 from truearm.doubts.of_results import COMPUTED, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, SINGLE_ROWS, WOULD_FIT
@@ -19,3 +20,8 @@ def grave_notices(calibration: Calibration) -> list[str]:
     """
     kinds = GRAVE if never_turns_freely(calibration.robot) else (*GRAVE, OPEN_SETUP)
     return [str(notice) for notice in calibration.notices if notice.kind in kinds]
+
+
+def undecided_notice(calibration: Calibration) -> str:
+    """That so few poses do not tell whether a calibration helps; empty where they do."""
+    return next((str(notice) for notice in calibration.notices if notice.kind == UNDECIDED), "")

@@ -101,6 +101,7 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
         "notices": [in_keys(notice) for notice in summary["notices"]],
+        "undecided": in_keys(made.undecided),
         "grave": [in_keys(notice) for notice in made.grave],
     }
 

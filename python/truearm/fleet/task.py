@@ -9,7 +9,7 @@ from truearm.calibration import Calibration
 from truearm.doubts.outliers import Outliers, judged_means_mm
 from truearm.doubts.points_together import points_together
 from truearm.fits.options import CalibrationOptions
-from truearm.fleet.doubted import grave_notices
+from truearm.fleet.doubted import grave_notices, undecided_notice
 from truearm.fleet.drift import check_comparable, drift_of
 from truearm.measurements import Measurements
 from truearm.reporting.report import report
@@ -53,6 +53,7 @@ class ArmMade:
         errors_of: What errors in mm are of: "position" or "distance".
         drift: What changed since the last calibration; None where there is none.
         grave: The notices that need attention.
+        undecided: The notice that so few poses do not tell whether it helps; empty without.
         files: The files of its measurements.
         report: The page; None where it was not asked for.
     """
@@ -65,6 +66,7 @@ class ArmMade:
     errors_of: str
     drift: dict[str, Any] | None
     grave: list[str]
+    undecided: str
     files: list[str]
     report: str | None
 
@@ -91,6 +93,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         errors_of=made.selection.errors_of,
         drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
+        undecided=undecided_notice(made),
         files=task.data.files,
         report=report(made).html if task.with_report else None,
     )

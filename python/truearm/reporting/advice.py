@@ -1,11 +1,12 @@
 """What would help most next, decided by rules from the data."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.of_results import (
@@ -22,6 +23,7 @@ from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
+from truearm.fits.identifiability import BASE, SETUP
 from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
@@ -42,7 +44,6 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
-SETUP_WORDS: Final = "the place of device or target"
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,20 @@ class Advice:
 def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
     found = [advice for rule in _rules(facts) for advice in rule(facts)]
-    if known is not None and not facts.is_of_no_help:
+    if known is not None and not (facts.is_of_no_help or facts.undecided):
         found += _where(facts, known)
     return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
 
 
 def _would_fit(facts: Facts) -> Iterator[Advice]:
-    for words in filter(None, map(facts.noticed, WOULD_FIT)):
+    kinds = (kind for kind in WOULD_FIT if kind not in STEP_KINDS)
+    for words in filter(None, map(facts.noticed, kinds)):
         yield Advice("would_fit", "Correct what does not fit.", words, np.inf)
+
+
+def _gave_way(facts: Facts) -> Iterator[Advice]:
+    for words in filter(None, map(facts.noticed, STEP_KINDS)):
+        yield Advice("gave_way", "Find what gave way.", words, np.inf)
 
 
 def _exchanged(facts: Facts) -> Iterator[Advice]:
@@ -91,8 +98,17 @@ def _refused(facts: Facts) -> Iterator[Advice]:
 def _checks(facts: Facts) -> Iterator[Advice]:
     if any(_exchanged(facts)) or facts.noticed(STATED_TOO_LARGE):
         return
-    words = to_check(NO_OUTLIERS if any(_would_fit(facts)) else facts.outliers)
+    has_reason = any(map(facts.noticed, WOULD_FIT))
+    words = to_check(NO_OUTLIERS if has_reason else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
+
+
+def _undecided(facts: Facts) -> Iterator[Advice]:
+    words = (
+        f"{facts.undecided}: an error like that of the nominal model may be chance. Do not use it before it "
+        "was judged on more."
+    )
+    yield Advice("more_poses", "Measure more poses.", words, 20.0 * facts.mean_mm())
 
 
 def _outliers(facts: Facts) -> Iterator[Advice]:
@@ -104,10 +120,11 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     named = [f"{entry['row']}{of_file[entry['file']]}" for entry in outliers[:ROWS_NAMED]]
     named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
+    sizes = _as_judged(facts, outliers)
     largest = [
-        f"{short(max(entry[name] for entry in outliers if name in entry))[0]} {unit}"
+        f"{short(max(entry[name] for entry in sizes if name in entry))[0]} {unit}"
         for name, unit in (("distance_mm", "mm"), ("turn_mrad", "mrad"))
-        if any(name in entry for entry in outliers)
+        if any(name in entry for entry in sizes)
     ]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
@@ -116,6 +133,15 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
         "interrupted beam, a loose target, or an arm that had not settled."
     )
     yield Advice("outliers", "Check the outliers.", words, facts.mean_mm() + share)
+
+
+def _as_judged(facts: Facts, outliers: list[dict[str, Any]]) -> list[Mapping[str, Any]]:
+    """The outliers with what was missed there before they were seen, of those that were held out, as the
+    verdict has them; with what the fit leaves of the others.
+    """
+    judged = [] if facts.held is None else facts.held.among(outliers, facts.best)
+    named = {(entry["file"], entry["row"]): entry for entry in judged}
+    return [named.get((entry["file"], entry["row"]), entry) for entry in outliers]
 
 
 def _no_longer_fits(facts: Facts) -> Iterator[Advice]:
@@ -159,13 +185,13 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         return
     trained = facts.calibration.validation.poses_trained
     unsure = (
-        f", though so few poses as {trained} hardly tell it from the rest"
+        ", though so few poses hardly tell noise from what the model misses"
         if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE
         else ""
     )
     words = (
-        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm{unsure}. The rest is "
-        f"what {trained} leave undetermined. Poses like those of the task help most."
+        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm{unsure}. What is more "
+        f"than noise is what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -297,8 +323,9 @@ def _range(facts: Facts, weak: Stretch) -> str:
 def _unseen(facts: Facts) -> Iterator[Advice]:
     found, selection = facts.calibration.identifiability, facts.calibration.selection
     pairs = zip(found.undetermined, found.words, strict=True)
-    of_target, lever = taken_over(facts), target_lever_mm(facts)
-    hidden = [name for name, words in pairs if SETUP_WORDS not in words and name not in of_target]
+    lever = target_lever_mm(facts)
+    harmless = {name for name, words in pairs if SETUP in words or BASE in words} | taken_over(facts)
+    hidden = [name for name in found.undetermined if name not in harmless]
     if hidden:
         is_on = lever is not None and lever < ON_THE_AXIS_MM
         more = ", and a target mounted off the last axis," if is_on else ""
@@ -365,15 +392,21 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         yield Advice(CONSTANT_BETTER, "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
+        against = (
+            f"the same {facts.mean_error} of {left} mm as constant parameters"
+            if left == before
+            else f"a {facts.mean_error} of {left} mm against {before} mm with constant parameters"
+        )
         words = (
-            f"The variable model gains little or nothing: a {facts.mean_error} of {left} mm against {before} "
-            "mm with constant parameters. They hardly vary, or the poses are too few to show it."
+            f"The variable model gains little or nothing: {against}. They hardly vary, or the poses are too "
+            "few to show it."
         )
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 
 
 RULES: Final = (
     _would_fit,
+    _gave_way,
     _exchanged,
     _refused,
     _outliers,
@@ -395,12 +428,18 @@ RULES: Final = (
     _intervals,
     _what_varies,
 )
-RULES_OF_UPDATES: Final = (_would_fit, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
-RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
+RULES_OF_UPDATES: Final = (_would_fit, _gave_way, _no_longer_fits, _refused, _left_out, _unseen, _few_held)
+RULES_WITHOUT_HELP: Final = (_would_fit, _gave_way, _exchanged, _checks, _stood_still)
+RULES_UNDECIDED: Final = (_undecided, _outliers, _stood_still, _few_held)
 
 
 def _rules(facts: Facts) -> tuple[Callable[[Facts], Iterator[Advice]], ...]:
-    """The rules that hold for a calibration: one that does not help tells nothing of noise or of the arm."""
+    """The rules that hold for a calibration.
+
+    One that does not help tells nothing of noise or of the arm, nor does one of which nothing is known yet.
+    """
     if facts.update is not None:
         return RULES_OF_UPDATES
+    if facts.undecided:
+        return RULES_UNDECIDED
     return RULES_WITHOUT_HELP if facts.is_of_no_help else RULES

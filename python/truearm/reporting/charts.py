@@ -43,9 +43,10 @@ def line(x: ArrayLike, y: ArrayLike, model: str, **more: Any) -> Trace:
     } | more
 
 
-def points(x: ArrayLike, y: ArrayLike, model: str, **more: Any) -> Trace:
-    """Points in the manner of a model."""
-    marker = {"color": colour_of(model), "symbol": marker_of(model), "size": 4, "opacity": 0.45}
+def points(x: ArrayLike, y: ArrayLike, model: str, *, faint: bool = True, **more: Any) -> Trace:
+    """Points in the manner of a model: `faint` beside a line that tells of them, or where they are many."""
+    look = {"size": 4, "opacity": 0.45} if faint else {"size": 8, "opacity": 1.0}
+    marker = {"color": colour_of(model), "symbol": marker_of(model), **look}
     return {
         "type": "scatter",
         "mode": "markers",

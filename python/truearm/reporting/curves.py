@@ -46,7 +46,8 @@ def influence(facts: Facts, effects: Floats) -> Figure:
     return Figure(
         f"Which parameter varies along which {_kinds(facts)}: the effect on the measured point",
         f"Largest: {names[k]} along {inputs[which]}, {fixed(shown[which, k])} mm peak to peak. Summed over "
-        f"the parameters, the effect is largest along {inputs[summed]}.",
+        f"the parameters, the effect is largest along {inputs[summed]}. Each cell is of one parameter "
+        "alone, in the mean over a few poses: together they may move the point farther.",
         [trace],
         {
             "xaxis": axis("parameter", tickangle=-90, **EVERY_NAME),
@@ -110,7 +111,7 @@ def _moves(facts: Facts, feature: str) -> str:
     mean, most = short(float(moved.mean()), float(moved.max()))
     poses = "measured poses" if facts.readings is not None else "poses"
     return (
-        f"Between {significant(ends[0])} and {significant(ends[1])} {feature} moves the {facts.point_name} "
+        f"From {significant(ends[0])} to {significant(ends[1])}, {feature} moves the {facts.point_name} "
         f"by {mean} mm on average over {poses}, by {most} mm at most."
     )
 

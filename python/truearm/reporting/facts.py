@@ -12,6 +12,7 @@ from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.description.one_turn import one_turn
 from truearm.doubts.at_once import STEP_KINDS
+from truearm.doubts.few_judged import UNDECIDED, FewJudged
 from truearm.doubts.grids import grid_steps, grid_words
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
@@ -149,7 +150,20 @@ class Facts:
     def is_of_no_help(self) -> bool:
         """Whether the calibration is wrong, so that nothing it says of noise or of the arm holds."""
         before, after = self.mean_mm(NOMINAL), self.mean_mm()
-        return not (helps(before, after) or self.gains_nothing or self.is_spoilt_by_rows)
+        told = helps(before, after) or self.gains_nothing or self.is_spoilt_by_rows
+        return not (told or self.undecided)
+
+    @property
+    def undecided(self) -> str:
+        """That so few poses were judged that they do not tell whether the calibration helps; else empty."""
+        validation, before, after = self.calibration.validation, self.mean_mm(NOMINAL), self.mean_mm()
+        few = FewJudged(
+            self.calibration.held, validation.n_holdout_poses, self.judged, self.best, self.outliers
+        )
+        if self.update is None:
+            return few.words if self.noticed(UNDECIDED) else ""
+        told = helps(before, after) or self.gains_nothing or not few.may_be_chance(after)
+        return "" if told else few.words
 
     @property
     def gains_nothing(self) -> bool:

@@ -37,7 +37,10 @@ def held_errors(facts: Facts) -> Section:
     if facts.held is None:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
-    parts: list[Part] = [histogram(errors, facts.counted), cumulative(errors, facts.counted)]
+    parts: list[Part] = [
+        histogram(errors, facts.counted),
+        cumulative(errors, facts.counted, _kept(facts, errors)),
+    ]
     words = (
         "Along the joints, lines are medians over stretches with equally many poses, and dots are errors of "
         f"the {facts.best} model; where poses are too few for lines, all models have dots."
@@ -92,8 +95,12 @@ def histogram(errors: Mapping[str, Floats], counted: str) -> Figure:
     )
 
 
-def cumulative(errors: Mapping[str, Floats], counted: str) -> Figure:
-    """Share of the poses or rows, as `counted` says, below each error (n,) in mm."""
+def cumulative(
+    errors: Mapping[str, Floats], counted: str, without: Mapping[str, Floats] | None = None
+) -> Figure:
+    """Share of the poses or rows, as `counted` says, below each error (n,) in mm; `without` are those (k,)
+    without outliers, where these are told.
+    """
     known = {name: np.sort(_known(values)) for name, values in errors.items()}
     low, high = _ends(known)
     traces = []
@@ -101,12 +108,10 @@ def cumulative(errors: Mapping[str, Floats], counted: str) -> Figure:
         share = 100.0 * np.arange(1, len(values) + 1) / len(values)
         kept = np.unique(np.linspace(0, len(values) - 1, min(len(values), 300)).astype(int))
         traces.append(line(values[kept], share[kept], name))
-    bounds = {name: float(np.quantile(values, 0.95)) for name, values in known.items()}
-    within = [f"{text} mm ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
     mark = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 95, "y1": 95}
     return Figure(
         "Cumulative distribution of the errors",
-        f"95 % of the {counted} have an error below {listed(within)}.",
+        f"95 % of the {counted} have an error below {_bounds(known, without or {}, 'mm')}.",
         traces,
         legend(
             xaxis=log_axis("position error, mm (logarithmic)", low, high),
@@ -114,6 +119,23 @@ def cumulative(errors: Mapping[str, Floats], counted: str) -> Figure:
             shapes=[{**mark, "line": {"color": "@muted", "width": 1, "dash": "dot"}}],
         ),
     )
+
+
+def _kept(facts: Facts, errors: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Errors (k,) without outliers, of errors (n,) of all held-out rows; empty where none is left out."""
+    if facts.held is None or not facts.leaves_outliers_out:
+        return {}
+    kept = facts.held.without(facts.outliers.entries)
+    return {name: values[kept] for name, values in errors.items()}
+
+
+def _bounds(errors: Mapping[str, Floats], kept: Mapping[str, Floats], unit: str) -> str:
+    """Below what 95 % of the errors (n,) of each model are, and without outliers where some are `kept`."""
+    words = []
+    for each in filter(None, (errors, kept)):
+        bounds = short(*(float(np.nanquantile(values, 0.95)) for values in each.values()))
+        words.append(listed([f"{text} {unit} ({name})" for name, text in zip(each, bounds, strict=True)]))
+    return ", without the outliers below ".join(words)
 
 
 def _ends(known: Mapping[str, Floats]) -> tuple[float, float]:
@@ -136,7 +158,7 @@ def along_joint(facts: Facts, joint: int) -> Figure:
         has_line = len(middles) >= FEWEST_STRETCHES
         if model == name or not has_line:
             single = _known(errors)[:DRAWN]
-            traces.append(points(q[known][:DRAWN], single, model, showlegend=not has_line))
+            traces.append(points(q[known][:DRAWN], single, model, faint=has_line, showlegend=not has_line))
             shown[f"{model}, points"] = single
         if has_line:
             traces.append(line(middles, medians, model))
@@ -186,11 +208,10 @@ def orientation(facts: Facts) -> list[Figure]:
         line(values, 100.0 * np.arange(1, len(values) + 1) / len(values), name)
         for name, values in known.items()
     ]
-    bounds = {name: float(np.quantile(values, 0.95)) for name, values in known.items()}
-    within = [f"{text} mrad ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
+    kept = _kept(facts, turned) if facts.outliers.means_mrad else {}
     figure = Figure(
         "Cumulative distribution of the orientation errors",
-        f"95 % of the {facts.counted} have an orientation error below {listed(within)}.",
+        f"95 % of the {facts.counted} have an orientation error below {_bounds(known, kept, 'mrad')}.",
         traces,
         legend(
             xaxis=log_axis("orientation error, mrad (logarithmic)", *_ends(known)),

@@ -27,14 +27,11 @@ def target_lever_mm(facts: Facts) -> float | None:
 
 
 def taken_over(facts: Facts) -> set[str]:
-    """Names of the parameters that free targets take over, however many and wherever they are; none for
-    distances.
+    """Names of the parameters that free targets take over, however many and wherever they are.
 
     What stands behind the last joint moves all targets alike, whatever the pose: the whole last link in the
     standard convention, in the modified one what follows its axis.
     """
-    if facts.calibration.selection.distances:
-        return set()
     arm = facts.calibration.arm
     last, behind = arm.table.size // KIND_COUNT - 1, BEHIND_ITS_JOINT[arm.robot.convention]
     pairs = zip(arm.candidates.names, arm.candidates.columns, strict=True)

@@ -45,6 +45,7 @@ SCHEMES: Final[Mapping[str, str]] = {
     "epochs": "largest number of epochs",
     "table": "rows of the hash table",
 }
+NOT_LOOKED_FOR: Final = "not looked for: only what the variable model leaves shows it"
 UNSET: Final[Mapping[str, str]] = {
     "train_size": "all that are not held out",
     "use": "several targets, else poses, else positions, as measured",

@@ -6,6 +6,7 @@ import numpy as np
 
 from truearm.doubts.as_calibrated import NOT_AS_CALIBRATED
 from truearm.doubts.at_once import STEP_KINDS
+from truearm.doubts.few_judged import UNDECIDED
 from truearm.doubts.of_results import OF_NO_USE
 from truearm.evaluation import Evaluation
 from truearm.judgement.validation import HEADINGS, STATISTICS
@@ -17,7 +18,7 @@ from truearm.reporting.parts import Part, Section, Table
 from truearm.solving import FEATURE_RANGE
 from truearm.units import MM_PER_METRE
 
-WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED, *STEP_KINDS)
+WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, UNDECIDED, NOT_AS_CALIBRATED, *STEP_KINDS)
 
 
 def not_met(facts: Facts) -> list[Advice]:
@@ -39,6 +40,8 @@ def _no_help(found: Evaluation) -> str:
     kinds = {notice.kind for notice in found.notices}
     if kinds & set(OF_NO_USE):
         return " On these measurements the calibration does not help."
+    if UNDECIDED in kinds:
+        return " So few poses do not tell whether the calibration helps."
     if kinds & set(STEP_KINDS):
         return " What was measured changed meanwhile."
     return (

@@ -4,12 +4,14 @@ import os
 from datetime import UTC, datetime
 from typing import Any
 
+from truearm.defaults import NO_DRIFT
 from truearm.errors import count_of, short_names
+from truearm.fits.models import VARIABLE
 from truearm.fits.options import CalibrationOptions
 from truearm.outlier_fate import fate_of_outliers, taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed
-from truearm.reporting.option_words import in_words, shown_options
+from truearm.reporting.option_words import NOT_LOOKED_FOR, in_words, shown_options
 from truearm.reporting.parts import Part, Section, Table, Text
 
 
@@ -79,7 +81,9 @@ def _options(facts: Facts) -> Table:
 
 
 def _value(facts: Facts, name: str, value: Any) -> str:  # noqa: ANN401
-    """The value of an option; of the rows held out, whether they were drawn, or planned to validate."""
+    """The value of an option; of rows held out whether they were drawn or planned, of drift whether the model
+    lets it be looked for.
+    """
     former = facts.calibration.validation.to_dict() if facts.update is None else facts.update["former"]
     planned = former.get("n_planned") or 0
     if name == "by_purpose" and value:
@@ -87,6 +91,8 @@ def _value(facts: Facts, name: str, value: Any) -> str:  # noqa: ANN401
     if name == "holdout" and planned:
         whole = planned >= former["n_holdout"]
         return "not drawn" if whole else f"{value}, drawn in files without such poses"
+    if name == "drift" and value != NO_DRIFT and facts.calibration.options.model != VARIABLE:
+        return NOT_LOOKED_FOR
     return in_words(name, value)
 
 

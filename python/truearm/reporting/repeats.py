@@ -197,7 +197,7 @@ def _standing(found: Repeats) -> str:
 
 def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
     """How far poses lie apart that a joint, or all as rows say themselves, reached from both sides."""
-    rows, beyond = [], []
+    rows, beyond, counts = list[list[str]](), list[str](), list[int]()
     noise = whole_noise_mm(facts.calibration)
     names = ["all joints"] if found.stated else [f"joint {joint + 1}" for joint in range(len(facts.joints))]
     for joint, name in enumerate(names):
@@ -205,6 +205,7 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         if len(apart) < FEWEST_GROUPS:
             continue
         both, expected = (float(np.sqrt(np.square(values).mean())) for values in (apart, alone))
+        counts.append(len(apart))
         rows.append([name, str(len(apart)), fixed(both), fixed(expected)])
         if both > expected * np.sqrt(1.0 + SURE * np.sqrt(2.0 / (COORDINATES * len(apart)))):
             beyond.append(f"{name} ({fixed(both)} mm)")
@@ -214,8 +215,9 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         "Poses approached from both sides",
         ["", "poses", "difference of the sides, mm", "expected from scatter, mm"],
         rows,
-        says=f"{_beyond(beyond)} Both columns are root mean squares; scatter is that within the sides, and "
-        f"the calibration's noise of {fixed(noise)} mm per coordinate where each has one measurement. "
+        says=f"{_beyond(beyond, counts, stated=found.stated)} Both columns are root mean squares; scatter is "
+        f"that within the sides, and the calibration's noise of {fixed(noise)} mm per coordinate where each "
+        "has one measurement. "
         + (
             f"The column {APPROACH} says from which side all joints came."
             if found.stated
@@ -225,16 +227,26 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
     return [table]
 
 
-def _beyond(joints: list[str]) -> str:
-    """Which joints' sides lie farther apart than scatter makes them."""
+def _beyond(joints: list[str], counts: list[int], *, stated: bool) -> str:
+    """Which joints' sides lie farther apart than scatter and chance make them.
+
+    Args:
+        joints: Those whose sides do.
+        counts: How many poses tell, of each joint that was looked at.
+        stated: Whether rows state the side, which is then of all joints.
+    """
+    few = " to ".join(str(count) for count in dict.fromkeys((min(counts), max(counts))))
+    chance = f"than scatter and chance may make of {few} poses"
+    if stated:
+        return f"The sides lie {'farther' if joints else 'no farther'} apart {chance}."
     if not joints:
-        return "No joint's sides lie farther apart than scatter makes them."
+        return f"No joint's sides lie farther apart {chance}."
     one = (
         " Joints that came from the other side in the same poses share what one of them does."
         if len(joints) > 1
         else ""
     )
-    return f"Farther apart than scatter makes them are the sides of {listed(joints)}.{one}"
+    return f"Farther apart {chance} lie the sides of {listed(joints)}.{one}"
 
 
 def _predicted(facts: Facts, data: Measurements, rows: Index, which: int) -> Floats:

@@ -71,6 +71,8 @@ def verdict(facts: Facts) -> str:
             start, why = gains_nothing(facts.best)
             return f"{said} {start}. {why}"
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
+    if facts.undecided:
+        return f"{said} So few do not tell whether the calibration helps: measure more poses."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
     return f"{said}{_changed(facts)}"
@@ -93,8 +95,22 @@ def _without_outliers(facts: Facts) -> str:
     numbers = short(*(float(found(errors)) for errors in kept for found in (np.nanmean, np.nanmax)))
     return (
         f" Without the outliers among them, {facts.outliers.judged}, they are {numbers[0]} mm and "
-        f"{numbers[1]} mm; {_former(facts)} {numbers[2]} mm and {numbers[3]} mm."
+        f"{numbers[1]} mm; {_former(facts)} {numbers[2]} mm and {numbers[3]} mm.{_turned_without(facts)}"
     )
+
+
+def _turned_without(facts: Facts) -> str:
+    """The orientation errors without the outliers; empty where none was measured."""
+    if not facts.outliers.means_mrad:
+        return ""
+    mean, former = short(*_turns_mrad(facts))
+    return f" The mean orientation error without them is {mean} mrad, {_former(facts)} {former} mrad."
+
+
+def _turns_mrad(facts: Facts) -> tuple[float, float]:
+    """Mean orientation errors without the outliers, mrad: of the model that predicts, and nominally."""
+    turns = facts.outliers.means_mrad
+    return turns[facts.best], turns[NOMINAL]
 
 
 def _former(facts: Facts) -> str:
@@ -105,6 +121,8 @@ def _former(facts: Facts) -> str:
 def tone(facts: Facts) -> Tone:
     """How good that is."""
     before, after = facts.mean_mm(NOMINAL), facts.mean_mm()
+    if facts.undecided:
+        return "fair"
     if facts.is_spoilt_by_rows or not helps(before, after):
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
@@ -122,16 +140,18 @@ def cards(facts: Facts) -> list[Card]:
     found = [
         Card(mean, "mm", f"mean error on {facts.judged} poses; {_former(facts)} {former}", tone(facts)),
         *_card_without_outliers(facts),
-        Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
     ]
-    if leaves_noise(facts.best) and not facts.is_of_no_help:
+    if several := validation.n_holdout_poses > 1:
+        found.append(Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"))
+    tells_noise = not (facts.is_of_no_help or facts.changed_meanwhile)
+    if leaves_noise(facts.best) and tells_noise:
         floor = facts.floor_mm
-        several = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
-        found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{several}"))
+        together = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
+        found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{together}"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
         found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
-    if validation.coverage_95 is not None and not facts.is_of_no_help:
+    if validation.coverage_95 is not None and tells_noise and several:
         share = f"{100 * validation.coverage_95:.1f}"
         found.append(Card(share, "%", "of the held-out coordinates lie within their 95 % intervals"))
     return found
@@ -141,8 +161,12 @@ def _card_without_outliers(facts: Facts) -> list[Card]:
     if not facts.leaves_outliers_out:
         return []
     mean, former = short(facts.mean_mm(), facts.mean_mm(NOMINAL))
-    words = f"mean error without the outliers among them; {_former(facts)} {former}"
-    return [Card(mean, "mm", words)]
+    without = f"without the outliers among them; {_former(facts)}"
+    found = [Card(mean, "mm", f"mean error {without} {former}")]
+    if facts.outliers.means_mrad:
+        mean, former = short(*_turns_mrad(facts))
+        found.append(Card(mean, "mrad", f"mean orientation error {without} {former}"))
+    return found
 
 
 def _short_mm(value: float) -> tuple[str, str]:
