@@ -175,7 +175,7 @@ def test_standard_deviations_of_a_target_are_its_own(arm, table):
     few.loc[3:, SECOND] = np.nan
     found, q = constants(few), arm.poses(20, seed=4)
     first, second = (found.position_std(q, group="data", target=number) for number in (1, 2))
-    assert (second > 1.5 * first).all()
+    assert (second > 1.05 * first).all()
 
 
 def test_targets_that_a_set_up_did_not_measure_are_no_answer(arm, by_set_up):

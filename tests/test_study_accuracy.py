@@ -16,7 +16,7 @@ from truearm.studies.accuracy.page import page
 from truearm.studies.accuracy.results import MARK, Kept, key_of
 from truearm.studies.accuracy.sets import parse_sets, read_set
 from truearm.studies.accuracy.splits import KINDS, Cut, cuts, divide
-from truearm.workers import Done, run_tasks
+from truearm.workers import Done
 
 POSES = 80
 FAST = ["--methods", "nominal,constant,grid", "--sizes", "20,30", "--seeds", "2", "--quick"]
@@ -114,6 +114,7 @@ def test_a_run_that_finds_results_anew_goes_on(file, tmp_path, here, monkeypatch
     out, given = tmp_path / "out", [*FAST, "--splits", "random"]
     assert study(file, out, *given, "--methods", "constant") == 0
     anew = [*given, "--methods", "constant,grid", "--again", "constant,grid"]
+    run_tasks = vars(running)["run_tasks"]
     monkeypatch.setattr(running, "run_tasks", lambda *args, **_: _until(run_tasks(*args), 5))
     assert study(file, out, *anew) == 130
     assert "the same command goes on with the others" in _words(capsys.readouterr().err)

@@ -4,7 +4,7 @@ use truearm_bank::{Input, Levers, range};
 use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_precision};
 
 use crate::FieldError;
-use crate::fit::FieldOptions;
+use crate::options::FieldOptions;
 use crate::training::{Column, Training};
 
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.

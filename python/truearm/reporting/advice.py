@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.doubts.at_once import STEP_KINDS
+from truearm.doubts.at_once import SETUP_TURNED, STEP_KINDS
 from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.of_results import (
@@ -23,6 +23,7 @@ from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
 from truearm.errors import count_of, short_names
+from truearm.fits.details import ANOTHER_PLACE
 from truearm.fits.identifiability import BASE, SETUP
 from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
@@ -78,7 +79,10 @@ def _would_fit(facts: Facts) -> Iterator[Advice]:
 
 
 def _gave_way(facts: Facts) -> Iterator[Advice]:
-    for words in filter(None, map(facts.noticed, STEP_KINDS)):
+    # An instrument that was put elsewhere has turned as well, and nothing gave way.
+    put_elsewhere = bool(facts.noticed(ANOTHER_PLACE))
+    kinds = (kind for kind in STEP_KINDS if not (put_elsewhere and kind == SETUP_TURNED))
+    for words in filter(None, map(facts.noticed, kinds)):
         yield Advice("gave_way", "Find what gave way.", words, np.inf)
 
 

@@ -5,8 +5,8 @@ use truearm_estimate::MeasurementSet;
 
 use super::common::{Measure, Truth, deviations, fit, root_mean_square, shots, six_axes, subset};
 use super::sets::rows_of;
-use crate::fit::FieldOptions;
 use crate::joined::{Joined, join};
+use crate::options::FieldOptions;
 use crate::training::Training;
 
 const STILL: f64 = 2e-5;

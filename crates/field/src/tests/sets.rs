@@ -5,10 +5,10 @@ use truearm_estimate::{MeasurementSet, Point, Setup};
 
 use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
 use crate::drives::Drives;
-use crate::fit::FieldOptions;
 use crate::hyper::{Hyper, Wave};
 use crate::joined::join;
 use crate::linear::training;
+use crate::options::FieldOptions;
 use crate::training::Training;
 
 /// Rows of measurements, linearised at the constant fit.
