@@ -68,7 +68,7 @@ impl<'a> Building<'a> {
         let mut left: Vec<usize> = self.of.rows(pose).collect();
         while let Some(&first) = left.first() {
             let (alike, others): (Vec<usize>, Vec<usize>) =
-                left.iter().partition(|&&row| self.are_alike(first, row));
+                left.iter().partition(|&&row| row == first || self.are_alike(first, row));
             if alike.len() > MOTIONS && !self.of.is_orientation[first] {
                 self.add_turned(&alike)?;
             } else {
