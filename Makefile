@@ -27,8 +27,11 @@ NEEDED := import tomllib; \
   print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -path '*/src/*') $(wildcard crates/*/Cargo.toml)
 PY_PATHS := python tests benches docs examples
-# macOS comes with a make that cannot keep the lines of a target together.
-TOGETHER := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
+
+# Much of it takes one processor: pip, types, the last crates of a build.
+ifeq ($(MAKELEVEL),0)
+MAKEFLAGS += --jobs=$(shell getconf _NPROCESSORS_ONLN || echo 2)
+endif
 
 # The first interpreter that is new enough and can make a virtual environment.
 define FIND_PYTHON
@@ -67,7 +70,8 @@ rust-test: $(STAMPS)/built
 	$(CARGO) test $(RUST_WHOLE)
 
 # Tests of cells and servers wait for a part of their time: half as many more at once as there are processors.
-py-test: $(STAMPS)/built
+# They mind how long things take, so that nothing else that was asked for runs beside them.
+py-test: $(STAMPS)/built | $(if $(filter check,$(MAKECMDGOALS)),py-check rust-check) $(if $(filter test,$(MAKECMDGOALS)),rust-test)
 	$(BIN)/python -m pytest --numprocesses "$$($(BIN)/python -c 'import os; print((3 * (os.cpu_count() or 1) + 1) // 2)')" \
 	  --dist worksteal --durations=15
 
@@ -76,15 +80,14 @@ py-test: $(STAMPS)/built
 trials: $(STAMPS)/built
 	TRUEARM_TRIALS=full $(BIN)/python -m pytest tests/test_cell_trials.py -s $(TRIALS)
 
-# Types take one core, what is in Rust more: side by side.
-check: $(STAMPS)/built
-	$(MAKE) --no-print-directory --jobs=2 $(TOGETHER) py-check rust-check
+check: rust-check py-check
 
-py-check: $(STAMPS)/built
+# Reads the sources: while Rust is built.
+py-check: $(STAMPS)/tools
 	$(BIN)/ruff check $(PY_PATHS)
 	$(BIN)/ruff format --check $(PY_PATHS)
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	PYTHONPATH=python $(BIN)/lint-imports
 
 rust-check: $(STAMPS)/built
 	$(CARGO) fmt --all --check
@@ -164,7 +167,6 @@ $(STAMPS)/extension: $(RUST_SOURCES) pyproject.toml $(STAMPS)/maturin
 	$(BIN)/maturin develop --release --locked --quiet --skip-install
 	@mv $@.started $@
 
-$(STAMPS)/built: $(RUST_SOURCES) pyproject.toml $(STAMPS)/maturin
-	@$(MAKE) --no-print-directory --jobs=2 $(TOGETHER) $(STAMPS)/extension $(STAMPS)/tools
+$(STAMPS)/built: $(STAMPS)/extension | $(STAMPS)/tools
 	$(BIN)/maturin develop --release --locked --quiet
 	@touch -r $(STAMPS)/extension $@

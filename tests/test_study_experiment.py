@@ -27,7 +27,7 @@ def small(tmp_path_factory):
     directory, printed = tmp_path_factory.mktemp("experiments") / "small", io.StringIO()
     with (
         LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
         ) as cluster,
         redirect_stdout(printed),
     ):

@@ -108,19 +108,17 @@ fn a_wave_that_is_too_fine_for_a_curve_is_found_and_taken_away() {
 #[test]
 fn outliers_do_not_hide_a_wave() {
     let arm = six_axes(Truth { wave: (8e-5, 202.0, 1), ..Truth::BENDING });
-    for outliers in [1, 4] {
-        let mut set = Measure::poses(150).of(&arm);
-        for pose in 0..outliers {
-            set.targets[3 * (35 * pose + 5) + pose % 3] += 20e-3;
-        }
-        let fit = fit(&arm, &set).unwrap();
-        let waves = &fit.field.hyper.waves;
-        assert!(waves.iter().any(|wave| wave.joint == 1 && wave.cycles == 202.0), "{outliers}: {waves:?}");
-        assert!(waves.iter().all(|wave| wave.amplitude < 2e-4), "{outliers}: {waves:?}");
-        let (_, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
-        let field = root_mean_square(&field);
-        assert!(field < 1.7 * NOISE, "{outliers} outliers: the field leaves {field}");
+    let mut set = Measure::poses(150).of(&arm);
+    for pose in 0..4 {
+        set.targets[3 * (35 * pose + 5) + pose % 3] += 20e-3;
     }
+    let fit = fit(&arm, &set).unwrap();
+    let waves = &fit.field.hyper.waves;
+    assert!(waves.iter().any(|wave| wave.joint == 1 && wave.cycles == 202.0), "{waves:?}");
+    assert!(waves.iter().all(|wave| wave.amplitude < 2e-4), "{waves:?}");
+    let (_, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+    let field = root_mean_square(&field);
+    assert!(field < 1.7 * NOISE, "the field leaves {field}");
 }
 
 #[test]
