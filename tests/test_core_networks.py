@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 import truearm as ta
 from truearm import _core
 from truearm.fits.identified import IdentifiedArm
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 LOW, HIGH = np.deg2rad([[-150.0, -30.0, -120.0], [150.0, 100.0, 0.0]])
 CELLS = (17, 11, 11)
 FIXTURES = Path(__file__).resolve().parents[2] / "shared" / "reference" / "rv_m2_fixtures.json"

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import truearm as ta
 from truearm import _core
 from truearm.fits.identified import IdentifiedArm
 from truearm.simulation import PAPER_PARAMETERS
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 NAMES = ("theta", "d", "a", "alpha", "beta")
 COLUMNS = [5 * int(name[-1]) + NAMES.index(name[:-1]) for name in PAPER_PARAMETERS]
 LOW, HIGH = np.deg2rad([[-150.0, -30.0, -120.0], [150.0, 100.0, 0.0]])

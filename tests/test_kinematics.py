@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from truearm import _core
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 DEG = np.pi / 180
 # Table I of the paper, mm: BASE, A1 to A5, TOOL.

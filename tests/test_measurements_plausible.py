@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from truearm.description.library import library_names
 from truearm.doubts.plausibility import FAR_FACTOR, check_against
@@ -16,9 +15,9 @@ from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
+from truearm.types import Floats
 from truearm.units import LengthUnit
 
-Floats = NDArray[np.float64]
 WORLD = np.array([3.0, -2.0, 0.5])
 
 

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
 from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
@@ -31,8 +30,7 @@ from truearm.planning.configurations import Configuration
 from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
 from truearm.planning.spaces import CartesianSpace, JointSpace, SphericalSpace
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 RV_M2 = Robot.load("rv-m2")
 SHOULDER = (0.0, -0.08, 0.4)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from truearm.errors import InputError
 from truearm.robot import Robot
+from truearm.types import Floats
 
 SPECIAL = ["0 0 1", "0 0 -1", "1 0 0", "0 -1 0", "0.6 0 0.8", "0.00001 0 1", "0 0.002 -1"]
 QUARTERS = [0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.570796]
@@ -36,7 +36,6 @@ joints = st.tuples(kinds, origins, angles, axes)
 
 Joint = tuple[str, tuple[float, ...], tuple[float, ...], str]
 Chain = Sequence[Joint]
-Floats = NDArray[np.float64]
 
 
 def urdf(chain: Chain) -> str:

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
 from truearm.rotations import (
     euler_from_matrix,
@@ -17,8 +16,7 @@ from truearm.rotations import (
     quaternion_from_rotation_vector,
     rotation_vector_from_matrix,
 )
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 COMPONENT = st.floats(-1.0, 1.0).map(lambda value: round(value, 6))
 QUATERNIONS = arrays(np.float64, (3, 4), elements=COMPONENT).filter(

@@ -3,14 +3,11 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.defaults import LARGEST_JOINT_DEG
 from truearm.inverse import Inverse
 from truearm.turns import EDGE_RAD, NearestTurns
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 NUMERIC: Final = "numeric"
 """Method of an arm without a closed form."""
@@ -18,7 +15,7 @@ CORRECTION_RAD: Final = np.deg2rad(LARGEST_JOINT_DEG)
 """So far apart a nominal and a calibrated arm may stand at one pose."""
 
 
-def crossed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
+def crossed(inverse: Inverse, q: Floats, before: Floats) -> Mask:
     """Whether a singularity lies between readings (n, N) and others (n, N) before them, (n,).
 
     One within EDGE_RAD of either does not count: rounded readings do not tell on which side of it they are.
@@ -26,7 +23,7 @@ def crossed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
     return np.asarray(_crossings(inverse, q, before).any(axis=1))
 
 
-def strayed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
+def strayed(inverse: Inverse, q: Floats, before: Floats) -> Mask:
     """Of solutions q (n, N) that the core takes to be on the branch of `before`, which are not, (n,).
 
     The core looks at the sign of the determinant of the Jacobian, which two singularities bring back. Where a
@@ -34,7 +31,7 @@ def strayed(inverse: Inverse, q: Floats, before: Floats) -> Bools:
     one, and the core is right, if this one alone is so near that what is corrected may take a joint over it.
     """
     crossings = _crossings(inverse, q, before)
-    found: Bools = np.asarray(crossings.any(axis=1))
+    found: Mask = np.asarray(crossings.any(axis=1))
     (asked,) = np.nonzero(found)
     if len(asked):
         far = _told(inverse, q[asked], CORRECTION_RAD) & _told(inverse, before[asked], CORRECTION_RAD)
@@ -70,9 +67,9 @@ def starts(inverse: Inverse, base_from_flange: Floats, seeds: Floats, *, nearest
     return found
 
 
-def _crossings(inverse: Inverse, q: Floats, before: Floats) -> Bools:
+def _crossings(inverse: Inverse, q: Floats, before: Floats) -> Mask:
     """Which sides (n, S) differ between two readings that both tell them."""
-    differ: Bools = inverse.sides(q) != inverse.sides(before)
+    differ: Mask = inverse.sides(q) != inverse.sides(before)
     (asked,) = np.nonzero(differ.any(axis=1))
     if len(asked):
         differ[asked] &= _told(inverse, q[asked]) & _told(inverse, before[asked])
@@ -86,10 +83,10 @@ def _beyond_edges(inverse: Inverse, base_from_flange: Floats, seeds: Floats) -> 
     return found
 
 
-def _told(inverse: Inverse, q: Floats, by_rad: float = EDGE_RAD) -> Bools:
+def _told(inverse: Inverse, q: Floats, by_rad: float = EDGE_RAD) -> Mask:
     """Which sides (n, S) readings (n, N) tell: those that they would tell with any joint `by_rad` away."""
     steps = by_rad * np.eye(q.shape[1])[inverse.robot.revolute]
     around = q[:, None] + np.concatenate([steps, -steps])
     sides = inverse.sides(around.reshape(-1, q.shape[1])).reshape(*around.shape[:2], -1)
-    told: Bools = (sides == sides[:, :1]).all(axis=1)
+    told: Mask = (sides == sides[:, :1]).all(axis=1)
     return told

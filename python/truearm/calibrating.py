@@ -53,8 +53,6 @@ from truearm.stages import Stages, no_stages
 from truearm.tables.columns import VALIDATE
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
-
 STUCK: Final = 0.2
 """Ratio of what constants leave below which those of the training rows were no minimum to judge."""
 ASTRAY: Final = 2.0

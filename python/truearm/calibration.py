@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
 from truearm.certainty.conservative import conservative_of
-from truearm.certainty.threes import AXES as ROWS_TOGETHER
 from truearm.certainty.uncertainty import ConstantSpread, SetupPlace, Spread, UpdatedSpread, VariableSpread
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
@@ -38,8 +37,7 @@ from truearm.solving import solve
 from truearm.storage import calibration_content
 from truearm.storage.calibration_file import calibration_bytes, parse_calibration, read_calibration
 from truearm.storage.summary import summarise
-
-Floats = NDArray[np.float64]
+from truearm.types import AXES, Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -403,7 +401,7 @@ class Calibration:
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
         (rows, single), asked = self._readings(q), words(names, "names")
-        count = ROWS_TOGETHER * -(-len(asked) // ROWS_TOGETHER)
+        count = AXES * -(-len(asked) // AXES)
         picked = np.zeros((len(rows), count, self.arm.table.size))
         for k, name in enumerate(asked):
             picked[:, k, self.arm.candidates.column(name)] = 1.0
@@ -429,7 +427,7 @@ class Calibration:
     def _covariance(self, rows: Floats, features: Features | None, end: Endpoint, jacobian: Floats) -> Floats:
         """Covariance (n, m, m) of an end's position, or pose, as the device saw base and target."""
         flanges = self.pose(rows, tool=np.eye(4), features=features)
-        moved = end.motions(flanges, pose=jacobian.shape[1] > ROWS_TOGETHER)
+        moved = end.motions(flanges, pose=jacobian.shape[1] > AXES)
         place = SetupPlace.at(self, end)
         return self.spread.covariance(self.field_inputs(rows, features), jacobian, moved, place)
 

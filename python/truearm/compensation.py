@@ -29,9 +29,8 @@ from truearm.solving import (
     moving_joints,
     plain_model,
 )
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
-
-Floats = NDArray[np.float64]
 
 TO_SHOWN: Final = np.array([MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE])
 TOOLS_KEPT: Final = 16

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.errors import InputError, list_names
 from truearm.files import read_text
@@ -14,9 +14,8 @@ from truearm.fits.endpoints import at_tool
 from truearm.inverse import Inverse
 from truearm.kinds import required
 from truearm.robot import URDF_ENDINGS, Robot
+from truearm.types import Floats
 from truearm.ur_kinematics import robot_from_conf, robot_from_yaml
-
-Floats = NDArray[np.float64]
 
 NOMINAL: Final = "nominal"
 YAML_ENDINGS: Final = (".yaml", ".yml")

@@ -24,10 +24,8 @@ from truearm.fits.models import CONSTANT, VARIABLE
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
 from truearm.rows.visits import means, visit_numbers
+from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 FEWEST_ROWS: Final = 30
 """Training rows of a set-up, at the least, that are asked for a drift: fewer have shown none."""

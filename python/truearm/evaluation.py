@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm._core import ANGLE_ARM_M, Setup
@@ -57,10 +56,7 @@ from truearm.rows.visits import pose_count, pose_numbers
 from truearm.solving import rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 ELSEWHERE: Final = 0.1
 """Share of the error that is left with frame and tool found anew where these are elsewhere, whatever else is

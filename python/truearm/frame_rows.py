@@ -12,11 +12,11 @@ from truearm.fits.enough_values import frame_unknowns, group_unknowns, measured_
 from truearm.fits.fitting import Task
 from truearm.measurements import Measurements
 from truearm.rows.visits import pose_numbers
+from truearm.types import Rows
 
 if TYPE_CHECKING:
     from truearm.evaluation import EvaluationOptions
 
-Rows = NDArray[np.int64]
 
 MOST_FRAME_POSES: Final = 400
 FEWEST_FRAME_POSES: Final = 3

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import setup_jacobian
 from truearm.errors import Notice, rows_in_words
@@ -19,14 +18,12 @@ from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.rows.shots import Scatter
 from truearm.rows.visits import pose_count, pose_numbers
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 FRAME_UNCERTAIN: Final = "frame_uncertain"
 WORTH_A_WORD: Final = 0.2
 """Part of the mean error from which on that of frame and tool is told."""
-AXES: Final = 3
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,8 @@ from truearm.tables.measured_fields import read_fields
 from truearm.tables.raw_tables import Marks, RawTable, read_raw
 from truearm.tables.reading import table_from_frame
 from truearm.tables.rotation_columns import RotationColumns
+from truearm.types import Floats
 from truearm.units import ANGLE_UNITS, COLUMN_ANGLE_UNITS, COLUMN_LENGTH_UNITS, STATED_LENGTH_UNITS, to_si
-
-Floats = NDArray[np.float64]
 
 UNITS: Final = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
 WHICH: Final = "target"

@@ -5,12 +5,12 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, check_finite
 from truearm.errors import InputError, UsageError, list_names, typed
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Features = Mapping[str, ArrayLike] | pd.DataFrame
 
 

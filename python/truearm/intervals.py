@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import NORMAL_95, residuals
 from truearm.doubts.nominal_misfit import some_rows
@@ -12,8 +11,6 @@ from truearm.fits.fitting import Fits, Task
 from truearm.fits.models import VARIABLE
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
-
-Floats = NDArray[np.float64]
 
 MOST_ROWS: Final = 500
 """More rows change the share by less than its own uncertainty, and cost time."""

@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import Inverse as Solver
 from truearm.arrays import as_rows, as_transforms
 from truearm.errors import InputError, WorkError, count_of, list_rows
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 SIDES: Final = (("rear", "front"), ("down", "up"), ("noflip", "flip"))
 
@@ -129,7 +127,7 @@ class Inverse:
         rows, _ = as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
         return [_name(sides) for sides in self._solver.branches(rows)]
 
-    def sides(self, q: ArrayLike) -> Bools:
+    def sides(self, q: ArrayLike) -> Mask:
         """Internal: on which side of each singularity the arm stands at readings (n, N), (n, S).
 
         Of an arm whose branches have names these are the shoulder's, the elbow's and the wrist's, of which
@@ -139,7 +137,7 @@ class Inverse:
         rows, _ = as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
         branches = self._solver.branches(rows)
         if any(sides is None for sides in branches):
-            positive: Bools = np.linalg.det(self.robot.joint_jacobian(rows, pose=True))[:, None] > 0.0
+            positive: Mask = np.linalg.det(self.robot.joint_jacobian(rows, pose=True))[:, None] > 0.0
             return positive
         named = np.array(branches, dtype=bool).reshape(-1, len(SIDES))
         named[:, 1] ^= named[:, 0]

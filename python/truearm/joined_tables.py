@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, list_names, list_rows
 from truearm.tables.raw_tables import RawTable
-
-Integers = NDArray[np.int64]
+from truearm.types import Integers
 
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NAMED: Final = 5

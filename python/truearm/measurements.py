@@ -20,9 +20,7 @@ from truearm.tables.columns import StatedUnits
 from truearm.tables.measured_fields import read_fields
 from truearm.tables.reading import read_csv_table, table_from_frame
 from truearm.tables.same_tables import identities, told_apart
-
-Floats = NDArray[np.float64]
-Texts = NDArray[np.str_]
+from truearm.types import Floats, Texts
 
 CONTENT: Final = ("readings", "targets", "orientations", "sigma_m", "group", "distance_m", "anchor", "pair")
 PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")

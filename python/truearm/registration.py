@@ -1,9 +1,8 @@
 """Points of a set-up: its frame in closed form, where its targets on the tool are known, and their spread."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def register(

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import WorkError, count_of
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 

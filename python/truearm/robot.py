@@ -13,12 +13,13 @@ from truearm.arrays import as_rows, check_out
 from truearm.description import robot_dict, robot_toml
 from truearm.description.library import library_text
 from truearm.description.robot_checks import check_sizes
-from truearm.description.robot_data import Convention, Floats, Joint, RobotData
+from truearm.description.robot_data import Convention, Joint, RobotData
 from truearm.description.robot_file import parse_robot_file
 from truearm.description.robot_table import table_fields
 from truearm.description.urdf import UrdfChain, read_urdf, urdf_chain
 from truearm.errors import InputError
 from truearm.files import is_file, read_text
+from truearm.types import Floats
 from truearm.units import MRAD_PER_RAD
 
 URDF_ENDINGS: Final = (".urdf", ".xml")

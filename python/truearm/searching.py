@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Solver
 from truearm.branches import NUMERIC, starts, strayed
 from truearm.inverse import Inverse
 from truearm.limits import Task
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 BRANCH: Final = (11, "the solution lies on another branch of the arm than its seed")
 """Code and reason of a refusal, as the core has them."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import ArmModel, CoreError, Solver
 from truearm.arrays import as_rows, as_transforms
@@ -17,12 +17,12 @@ from truearm.limits import TASKS, Limits, Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.searching import Search
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm._core import CorrectorOptions
     from truearm.calibration import Calibration
 
-Floats = NDArray[np.float64]
 
 FEATURE_RANGE: Final = "feature_range"
 MARGIN: Final = 0.02

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import CoreError, Stream
 from truearm.arrays import as_numbers
@@ -14,12 +14,11 @@ from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
 from truearm.errors import InputError, UsageError, list_names
 from truearm.kinds import check_number, check_values, settle
 from truearm.named_values import check_readings
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm import _core
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,10 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.robot_data import RobotData
+from truearm.types import Floats, Integers, Mask
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 EDGE_RAD: Final = np.deg2rad(0.01)
 """Readings are shown and written rounded: so near to an edge, a joint may be on the other side of it."""
@@ -60,7 +56,7 @@ class NearestTurns:
         return np.arange(len(branches)), turned
 
 
-def _turning(robot: RobotData) -> Bools:
+def _turning(robot: RobotData) -> Mask:
     """Joints (N,) of which a full turn more is the same pose: all that is coupled to them turns fully too."""
     same = np.where(robot.revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
     return np.asarray(same.all(axis=0))

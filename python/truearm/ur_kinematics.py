@@ -21,15 +21,13 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from truearm.description.dh_from_axes import Axis, dh_from_axes
 from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, list_names
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_euler, transform_from_parts
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 LINKS: Final = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 NUMBERS: Final = ("x", "y", "z", "roll", "pitch", "yaw")

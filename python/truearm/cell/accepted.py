@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from truearm.cell.checks import unsure_steps
 from truearm.cell.poses_file import GROUP
@@ -14,8 +13,7 @@ from truearm.cell.scatter import sigma_of_mean_m, weighted_mean
 from truearm.cell.session import Session
 from truearm.measurements import Measurements
 from truearm.tables.columns import APPROACH, POSE, PURPOSE, READINGS
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 QUERY = """
 SELECT o.step, o.pose, o.purpose, o.approach, o.attempts, o.time_s,

@@ -5,13 +5,11 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.reading import Reading
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 SHARE_OF_AGREEMENT: Final = 0.25
 """How much of what readings of a pose may differ by the arm may move while one of them is made."""

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator
 
 from truearm._core import Chain
@@ -21,9 +20,9 @@ from truearm.files import parsed, read_text
 from truearm.planning.accessibility import AboveFloor, Rule
 from truearm.robot import Robot as Arm
 from truearm.rotations import UNIT_TOLERANCE, rotation_onto, transform_from_parts
+from truearm.types import Floats
 from truearm.units import to_si
 
-Floats = NDArray[np.float64]
 Seen = Callable[[Floats], tuple[Floats, Floats]]
 
 

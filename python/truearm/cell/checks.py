@@ -4,16 +4,14 @@ import json
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import ProcessSection
 from truearm.cell.in_a_row import STEADY
 from truearm.cell.scatter import explained_m, sigma_of_mean_m, weighted_mean
 from truearm.cell.session import Session
 from truearm.errors import Notice, WorkError, list_rows
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 DRIFT_MM: Final = "drift_mm"
 """In the head of a session: how far the first contact may have moved, mm."""

@@ -7,7 +7,6 @@ flange to target that may not go through the plate around the panel.
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm._core import Clearance as Gaps
@@ -16,9 +15,8 @@ from truearm.cell.panel import Panel
 from truearm.fits.parameters import A, D
 from truearm.planning.folding import SHORTEST_LINK_M
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 # How far the plate reaches beyond the effective area.
 RIM_M: Final = 0.02

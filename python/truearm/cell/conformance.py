@@ -15,14 +15,12 @@ from operator import itemgetter
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.device_errors import DeviceError, MalformedReadingError, StoppedError
 from truearm.cell.protocols import Connected, Device, Robot, Sensor
 from truearm.cell.reading import Expected, Reading, checked_reading
 from truearm.errors import TruearmError
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 THERE_RAD: Final = 2e-3
 STOPS_WITHIN_S: Final = 2.0

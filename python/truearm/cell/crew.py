@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.device_errors import Calls, DeviceError, RefusedError, StoppedError
@@ -15,8 +14,7 @@ from truearm.cell.protocols import Device
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.ways import Ways
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 LETS_GO_WITHIN_S: Final = 0.7
 

@@ -4,14 +4,10 @@ import math
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.cell.reading import Reading
 from truearm.cell.session import Session, Step
 from truearm.errors import WorkError
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 UNMEASURED_IN_A_ROW: Final = 5
 FAR_IN_A_ROW: Final = 3

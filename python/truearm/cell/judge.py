@@ -4,13 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.cell.scatter import explained_m, weighted_mean
 from truearm.cell.session import Point, Stored
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 REPEATS_WHEN_SUSPICIOUS: Final = 1
 

@@ -8,7 +8,6 @@ import time
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import field_validator
 
 from truearm.cell.device_errors import DeviceError, DeviceSilentError, RefusedError
@@ -19,9 +18,8 @@ from truearm.cell.schema import Positive
 from truearm.errors import InputError
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
+from truearm.types import Floats
 from truearm.units import AngleUnit, StatedLengthUnit, to_si
-
-Floats = NDArray[np.float64]
 
 SENDINGS: Final = 4
 ASKS_EVERY_S: Final = 0.02

@@ -7,7 +7,6 @@ import time
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from truearm.cell.channels import tcp_place
@@ -18,9 +17,9 @@ from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading, is_column
 from truearm.cell.schema import Positive
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, StatedLengthUnit, to_si
 
-Floats = NDArray[np.float64]
 Numbers = dict[str, float]
 
 XYZ: Final = ("x", "y", "z")

@@ -7,9 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.cell.accepted import points_and_joints
 from truearm.cell.alone import alone
 from truearm.cell.at_rest import AtRest
@@ -35,9 +32,8 @@ from truearm.cell.session import Session, Step, Stored
 from truearm.cell.stops import Stops, kind_of
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
 from truearm.errors import count_of
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 # Between the last look whether to go on and the moment at which a device can be stopped.
 BEGINS_WITHIN_S: Final = 0.05

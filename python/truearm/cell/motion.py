@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell, ClearanceSection, ProcessSection
 from truearm.cell.poses_file import Poses
@@ -16,13 +15,12 @@ from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.errors import InputError
-from truearm.planning.accessibility import Mask, Rule, accessible, lowest
+from truearm.planning.accessibility import Rule, accessible, lowest
 from truearm.planning.folding import ClearOfItself
 from truearm.planning.joint_ways import JointWays
 from truearm.robot import Robot
+from truearm.types import Floats, Mask
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

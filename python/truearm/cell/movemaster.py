@@ -23,13 +23,12 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
-Floats = NDArray[np.float64]
 Tenths = tuple[int, ...]
 
 TERMINATOR: Final = b"\r"

@@ -8,7 +8,8 @@ import numpy as np
 from networkx.algorithms import approximation
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
+
 Order = NDArray[np.int64]
 
 BAND_M: Final = 0.08

@@ -7,9 +7,8 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 AXES: Final = {
     f"{sign}{axis}": (1.0 if sign == "+" else -1.0) * np.eye(3)[k]

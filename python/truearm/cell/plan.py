@@ -34,9 +34,8 @@ from truearm.planning.choosing import (
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
 from truearm.tables.columns import REPEAT, VALIDATE
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 CHOICES: Final = 4
 """How often poses are chosen where the arm does not get to some of them."""

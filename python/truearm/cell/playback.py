@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.device_errors import DeviceError, RefusedError
 from truearm.cell.protocols import Managed
@@ -17,9 +16,8 @@ from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import transform_from_parts
 from truearm.tables.columns import APPROACH
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 SAME_RAD: Final = 1e-6
 

@@ -12,8 +12,7 @@ from truearm.robot import Robot
 from truearm.tables.columns import APPROACH, PURPOSE, StatedUnits
 from truearm.tables.measured_fields import read_joint_columns
 from truearm.tables.reading import Table, read_csv_table
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 GROUP: Final = "group"
 MOST_NAMED: Final = 3

@@ -3,15 +3,13 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.cell.cell_file import Cell
 from truearm.cell.reading import Expected
 from truearm.cell.session import Step
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 REACH_M: Final = 1.0
 SIGMAS: Final = 4.0

@@ -35,9 +35,8 @@ from truearm.proposing import (
     next_poses,
 )
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.updating import UpdateOptions
-
-Floats = NDArray[np.float64]
 
 WORKSPACE: Final = 300
 """Poses at which the expected error counts."""

@@ -13,12 +13,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.cell.reading import Expected, Reading
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 T = TypeVar("T", bound="Device")
 
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.arrays import rotation_fault
 from truearm.cell.device_errors import MEND_THE_DRIVER, MalformedReadingError
 from truearm.cell.shown import shown
 from truearm.tables.columns import PURPOSE, means_something
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 TRUTHS: Final = (bool, np.bool_)
 TOLERANCE: Final = 1e-3

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.line_sensor import LineSensor
 from truearm.errors import WorkError
 from truearm.registration import register, spread_m
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
+from truearm.types import Floats
 from truearm.units import MM_PER_INCH, MM_PER_METRE, STATED_LENGTH_UNITS
-
-Floats = NDArray[np.float64]
 
 LEAST_POSES: Final = 4
 LEAST_SPREAD_M: Final = 0.03

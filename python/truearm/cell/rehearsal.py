@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
@@ -23,9 +22,8 @@ from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.ways import Ways
 from truearm.planning.joint_ways import JointWays
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 BROKEN: Final = "arm or tool would leave the room on the way there, from the step before"
 

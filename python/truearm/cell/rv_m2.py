@@ -17,7 +17,6 @@ import time
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from truearm.cell import movemaster
@@ -34,9 +33,8 @@ from truearm.cell.schema import Frame, Positive
 from truearm.inverse import Inverse
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
+from truearm.types import Floats
 from truearm.units import RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 # The read-out may be off by its rounding, half a unit, and by the rounding of what is added up in it.
 READOUT_TOLERANCE: Final = 0.11

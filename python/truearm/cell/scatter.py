@@ -6,16 +6,13 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import ProcessSection
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 AS_RARE_AS: Final = 4.0
 """A distance is explained up to one as rare as a normal value this many standard deviations off."""
-AXES: Final = 3
 
 
 @cache

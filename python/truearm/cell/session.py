@@ -17,7 +17,6 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 from filelock import FileLock, Timeout
-from numpy.typing import NDArray
 
 from truearm.cell.reading import Reading
 from truearm.cell.session_checks import PUT_BACK, check_values, unreadable, value_of
@@ -25,8 +24,8 @@ from truearm.cell.session_opening import connected, opened_to_read
 from truearm.cell.session_schema import SCHEMA, VERSION
 from truearm.errors import InputError, WorkError
 from truearm.rotations import quaternion_from_matrix
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Point = tuple[float, ...]
 
 ADD_READING: Final = "INSERT INTO readings VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
@@ -15,8 +14,6 @@ from truearm.cell.session import Session
 from truearm.defaults import NO_DRIFT
 from truearm.errors import TruearmError
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 LEAST_POSES: Final = 15
 LEAST_FOR_VARIABLE: Final = 60

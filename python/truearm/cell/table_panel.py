@@ -13,7 +13,6 @@ import time
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from truearm.cell.device_errors import (
@@ -32,9 +31,9 @@ from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section, Vector2, Vector3
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
 
-Floats = NDArray[np.float64]
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 SENDINGS: Final = 5

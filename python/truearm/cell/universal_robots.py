@@ -9,7 +9,6 @@ import time
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell import ur_packets
 from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp, tcp_address
@@ -31,8 +30,7 @@ from truearm.cell.schema import Positive, Section, TcpPort
 from truearm.errors import InputError
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 JOINTS: Final = 6
 THERE_RAD: Final = 2e-4

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 LENGTH: Final = struct.Struct(">i")
 TIME_AT: Final = 4

@@ -4,15 +4,13 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
 from truearm.cell.device_errors import RefusedError
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 # How far the table goes down at first to let the arm pass; if that does not help, as far as it can.
 DEPTHS_M: Final = (0.03, 0.1)

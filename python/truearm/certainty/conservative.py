@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from truearm._core import Chain, Conservative
 from truearm.description.robot_data import OPEN_REACH_M
 from truearm.fits.fitting import feature_values
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm._core import BoundsPlan
     from truearm.calibration import Calibration
     from truearm.robot import Robot
 
-Floats = NDArray[np.float64]
 
 SAMPLES: Final = 4000
 FEWEST_SAMPLES: Final = 2000

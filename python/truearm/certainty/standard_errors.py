@@ -1,9 +1,6 @@
 """How far the constants of the constant model are from those of the arm."""
 
-from typing import Final
-
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import linearise, setup_jacobian
 from truearm.defaults import ROBUST
@@ -15,10 +12,7 @@ from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import held_parts
 from truearm.rows.shots import variance_factor
 from truearm.rows.visits import pose_numbers
-
-Floats = NDArray[np.float64]
-
-AXES: Final = 3
+from truearm.types import AXES, Floats
 
 
 def of_covariance(covariance: Floats, count: int) -> Floats:

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.certainty.threes import repeated, threes
 from truearm.revision import Carried
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 @dataclass(frozen=True, eq=False)

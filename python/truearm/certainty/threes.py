@@ -1,13 +1,8 @@
 """Rows of derivatives three at a time, the values of a point or of a rotation, as a posterior takes them."""
 
-from typing import Final
-
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
-AXES: Final = 3
+from truearm.types import AXES, Floats
 
 
 def in_threes(inputs: Floats, jacobian: Floats, setup: Floats | None) -> tuple[Floats, Floats, Floats | None]:

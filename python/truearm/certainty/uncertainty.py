@@ -6,11 +6,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final, Protocol, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import CoreError, Posterior
 from truearm.certainty.successive import Successive
-from truearm.certainty.threes import AXES, in_threes
+from truearm.certainty.threes import in_threes
 from truearm.errors import InputError, WorkError
 from truearm.fits.core_set import core_set
 from truearm.fits.endpoints import Endpoint
@@ -25,12 +24,11 @@ from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import CONSTANT
 from truearm.fits.parameters import are_lengths
 from truearm.revision import Carried
+from truearm.types import AXES, Floats, Mask
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BATCH: Final = 512
 """Configurations that an updated calibration is asked for together with the rows of its update."""

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.cli.console import print_table, say, say_wrapped
@@ -12,9 +11,8 @@ from truearm.errors import InputError, UsageError
 from truearm.framing import IdentifiedFrame, former_entry, tip_covariance
 from truearm.measurements import Measurements
 from truearm.rotations import matrix_from_quaternion, quaternion_from_euler, quaternion_from_matrix
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 
 def stated_orientation(stated: str | None, data: Measurements, output: Path, name: str) -> Floats | None:

@@ -1,15 +1,13 @@
 """A compensated program as `truearm compensate` shows it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cli.console import print_table, say, say_wrapped
 from truearm.errors import count_of
 from truearm.programs.listing import describe, listed_target, shortened
 from truearm.programs.report import counts, table_rows, unified_diff
 from truearm.programs.rewriting import Rewritten
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 ROWS_SHOWN = 100
 LISTED_SHOWN = 30

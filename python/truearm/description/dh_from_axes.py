@@ -13,17 +13,15 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_row import row_transform
 from truearm.rotations import rigid_inverse
+from truearm.types import Floats
 
 PARALLEL_RAD: Final = 0.01
 """Below this the common normal is more than a hundred offsets away: alpha and beta describe it better."""
 SAME_DIRECTION: Final = 1e-12
 SAME_POINT_M: Final = 1e-12
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,11 @@
 """Where a robot's joint axes are with all joint values at zero."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_from_axes import Axis
 from truearm.description.dh_row import row_transform
 from truearm.description.robot_data import RobotData
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def axes_at_zero(robot: RobotData) -> tuple[list[Axis], Floats]:

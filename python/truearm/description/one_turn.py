@@ -3,12 +3,10 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.robot_data import RobotData
+from truearm.types import Floats
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
 
 OPEN_WAY_M: Final = 1.0
 """Of a joint that slides without limits."""

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.arrays import frozen, rigid
 from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
+from truearm.types import Floats
 
 Convention = Literal["standard", "modified"]
 Joint = Literal["revolute", "prismatic"]
-Floats = NDArray[np.float64]
 
 MIN_COUPLING_DETERMINANT: Final = 1e-9
 TRANSFORMS: Final = ("base", "flange", "tool")

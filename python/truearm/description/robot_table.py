@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers
 from truearm.description.robot_data import Joint
 from truearm.description.robot_file import ROW_KEYS
 from truearm.errors import InputError, count_of
 from truearm.named_values import check_row
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 WITHOUT_BETA: Final = 4
 WITH_BETA: Final = 5

@@ -5,16 +5,14 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_row import row_transform
 from truearm.description.robot_data import Payload, RobotData
 from truearm.description.robot_file import Link, PayloadSection, Placement, RobotFile, Row, UrdfSection
 from truearm.description.urdf_names import UrdfNames
 from truearm.rotations import quaternion_from_matrix, transform_from_parts
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 
 def fields_of(file: RobotFile) -> dict[str, Any]:

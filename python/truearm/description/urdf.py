@@ -11,7 +11,6 @@ from typing import Any, Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_from_axes import Axis, dh_from_axes
 from truearm.description.robot_checks import MAX_LENGTH_M, NO_LONGER
@@ -23,8 +22,8 @@ from truearm.description.urdf_rounding import rounded_by
 from truearm.description.xml_as_written import xml_as_written
 from truearm.errors import InputError
 from truearm.files import read_text
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 READ: Final = {"origin": ("xyz", "rpy"), "axis": ("xyz",), "limit": ("lower", "upper"), "mimic": ("joint",)}
 """Elements of a joint that are read, and their attributes."""
 

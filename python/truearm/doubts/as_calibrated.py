@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.doubts.gross_rows import AXES, Expected, widened
+from truearm.doubts.gross_rows import Expected, widened
 from truearm.doubts.nominal_misfit import some_rows
 from truearm.doubts.of_results import helps
 from truearm.doubts.outliers import Outliers, known_mean_mm, own_means_mm
@@ -16,9 +15,8 @@ from truearm.errors import Notice
 from truearm.fits.models import NOMINAL
 from truearm.judgement.held_rows import HeldRows
 from truearm.lengths import length_mm
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 NOT_AS_CALIBRATED: Final = "not_as_calibrated"
 AS_KNOWN: Final = 2.0

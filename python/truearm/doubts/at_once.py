@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import AXES, Floats, Rows
 
 TARGET: Final = "target"
 JOINT: Final = "joint"
@@ -23,7 +21,6 @@ JOINT_MOVED: Final = "joint_moved"
 SETUP_TURNED: Final = "setup_turned"
 STEP_KINDS: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED)
 """Kinds of notices of what stands otherwise from some row on."""
-AXES: Final = 3
 BESIDE: Final = 5
 """Visits before and behind a step, at the least: fewer are outliers."""
 FAINT: Final = 0.01

@@ -6,7 +6,6 @@ from itertools import chain, combinations, product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.description.robot_data import Convention as Rows
@@ -19,9 +18,8 @@ from truearm.fits.parameters import ALPHA, KINDS, THETA, A, D
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 BETTER: Final = 5.0
 """Times that the right convention brings the nominal arm closer: one that is wrong leaves centimetres."""

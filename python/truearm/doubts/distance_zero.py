@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import CoreError, Setup, fit_constant
 from truearm.doubts.zeros_together import counted_parts, found_together
@@ -14,10 +13,8 @@ from truearm.fits.core_set import anchor_names, core_set
 from truearm.fits.fitting import Task, fit_options
 from truearm.fits.models import ArmModel
 from truearm.measurements import Measurements
+from truearm.types import Floats, Mask
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DISTANCE_ZERO: Final = "distance_zero"
 EXPLAINED: Final = 0.7

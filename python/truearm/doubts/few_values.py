@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.fits.stillness import still_joints
 from truearm.rows.visits import pose_numbers
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 FEWEST_POSES: Final = 12
 POSES_A_VALUE: Final = 4

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.doubts.few_values import few_values
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 SHOWN: Final = {"revolute": 1.0 / RADIANS_PER_DEGREE, "prismatic": MM_PER_METRE}
 FEWEST_ROWS: Final = 30

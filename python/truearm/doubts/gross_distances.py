@@ -8,16 +8,13 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import ConstantFit, fit_constant
 from truearm.doubts.unbent import UNBENT, unbent
 from truearm.fits.core_set import core_set, distance_ends
 from truearm.fits.fitted_rows import OVERWHELMING, FittedRows, at_rows
 from truearm.fits.fitting import Fits, Task, constant_variances, core_errors, fit_options
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 MOST_TESTED: Final = 20
 """Distances far off, those nearest to the limit, each of which is tested by a fit of its own."""

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, WorkError, list_outliers
@@ -20,10 +19,9 @@ from truearm.measurements import Measurements
 from truearm.rotations import rigid_motion
 from truearm.rows.leaving_out import left_out
 from truearm.storage.summary import noise_mm
+from truearm.types import AXES, Floats, Rows
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Entry = dict[str, Any]
 
 FAR_ROWS: Final = "far_rows"
@@ -32,7 +30,6 @@ FAR: Final = 8.0
 """Times what the calibration expects: in another set-up, on another day, ordinary errors are larger."""
 UNUSUAL: Final = 9.0
 """Times the median of the others: errors have tails, and none reaches so far."""
-AXES: Final = 3
 FAINT: Final = 1e-9
 """What a direction that no row tells counts for, as a share of what all of them tell."""
 RULE: Final = (

@@ -3,13 +3,11 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.one_turn import one_turn
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 HELD_RAD: Final = 2.0 * RADIANS_PER_DEGREE
 """A direction that turns by less, root mean square, points one way."""

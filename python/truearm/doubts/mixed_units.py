@@ -3,16 +3,13 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.robot import Robot
+from truearm.types import Floats, Mask
 from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FAR: Final = 100.0
 """Lengths that are so many times larger or smaller than most are no others of the same unit."""

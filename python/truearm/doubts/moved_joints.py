@@ -10,22 +10,20 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
 from truearm.doubts.at_once import BESIDE, JOINT_MOVED
 from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, poses_of, share_explained
 from truearm.doubts.slips import Slip
-from truearm.doubts.whitened import AXES, Whitened
+from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice, count_of
 from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
 from truearm.inputs import is_payload
 from truearm.lengths import length_mm
 from truearm.tables.columns import OF_MEASURING
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 UNUSED_COLUMN: Final = "unused_column"
 JOINTS_MOVED: Final = "joints_moved"

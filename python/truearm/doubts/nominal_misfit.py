@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain, ConstantFit, CoreError, Problem, Setup, fit_constant, residuals
 from truearm.fits.core_set import measured_points
@@ -12,9 +11,7 @@ from truearm.fits.fitting import fit_options
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import Floats, Rows
 
 MOST_ROWS: Final = 60
 FEWEST_ROWS: Final = 12

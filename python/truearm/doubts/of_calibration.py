@@ -4,9 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import constant_details
 from truearm.defaults import NO_DRIFT
@@ -50,8 +47,7 @@ from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import distance_at_floor_mm, whole_noise_mm
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 OPEN_SETUP: Final = "open_setup"
 UNFOLLOWED: Final = 3.0

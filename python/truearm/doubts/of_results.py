@@ -25,9 +25,8 @@ from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.outlier_fate import FULL_WEIGHT
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 FAR_M: Final = 0.01
 FAR_SHARE: Final = 2e-3

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.doubts.mixed_units import check_mixed_units
 from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows
@@ -16,10 +15,8 @@ from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
+from truearm.types import Mask
 from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ALIKE_RAD_OR_M: Final = 1e-4
 MOST: Final = 0.5

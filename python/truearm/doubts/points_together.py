@@ -10,9 +10,7 @@ from truearm.errors import Notice
 from truearm.measurements import Measurements
 from truearm.rows.used_distances import holds_distances
 from truearm.rows.visits import means, visit_numbers
-
-Mask = NDArray[np.bool_]
-Rows = NDArray[np.int64]
+from truearm.types import Mask, Rows
 
 KIND: Final = "points_together"
 

@@ -3,14 +3,12 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import Notice
 from truearm.lengths import length_mm
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 STEPS: Final = tuple((10.0**-decimals, unit) for unit in ("deg", "rad") for decimals in range(5))
 """What readings of joints that turn are rounded to, the coarsest of a unit first."""

@@ -16,10 +16,8 @@ from truearm.fits.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 LAGS: Final = (0, 1, -1, 2, -2)
 """By how many rows the readings of a point may stand further on: logs lose one or two."""

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.defaults import NO_DRIFT
 from truearm.errors import Notice
@@ -11,9 +10,7 @@ from truearm.fits.fitting import Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rows.visits import visit_numbers
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import Floats
 
 FEWEST_VISITS: Final = 30
 FOLLOWED: Final = 0.6

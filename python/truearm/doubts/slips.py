@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.defaults import NO_DRIFT
 from truearm.doubts.at_once import (
-    AXES,
     BESIDE,
     FRAME,
     JOINT,
@@ -31,11 +29,8 @@ from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import AXES, Floats, Mask, Rows
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED}
 MOSTLY: Final = 0.5

@@ -6,17 +6,14 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.doubts.nominal_misfit import Seen, relative_misfit
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.errors import InputError, Notice, list_rows
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import Floats, Mask
 from truearm.units import RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MAX_READING_RAD: Final = 4.0 * np.pi
 """Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""

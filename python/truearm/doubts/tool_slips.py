@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.doubts.at_once import AXES, TARGET, TARGET_SLIPPED, Shape, Step
+from truearm.doubts.at_once import TARGET, TARGET_SLIPPED, Shape, Step
 from truearm.doubts.slips import Session, Slip, sessions_of, slips_of
 from truearm.doubts.whitened import Whitened
 from truearm.fits.enough_values import FRAME_UNKNOWNS
 from truearm.fits.fitted_rows import FittedRows
-
-Floats = NDArray[np.float64]
+from truearm.types import AXES, Floats
 
 
 def tool_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list[Slip]:

@@ -5,7 +5,6 @@ another export of the rest.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.doubts.of_results import FITS_OTHERWISE
@@ -13,10 +12,8 @@ from truearm.errors import Notice
 from truearm.fits.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
+from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 PARTS = 3
 """Of so many parts of a set-up the first and the last are each read in one way."""

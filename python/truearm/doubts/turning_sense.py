@@ -5,15 +5,13 @@ from itertools import permutations, product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
 from truearm.tables.euler_orders import otherwise_read, usual_first, with_twin
-
-Floats = NDArray[np.float64]
+from truearm.types import AXES, Floats
 
 MISFIT: Final = 0.2
 """Turns from pose to pose that are off by so much (sine of the angle) are not those of the robot, nor are
@@ -26,7 +24,6 @@ MOST_POSES: Final = 60
 AS_WELL: Final = 1.5
 """Kinds fit as well whose misfits are within this factor of the least."""
 MOST_NAMED: Final = 2
-AXES: Final = 3
 ABOUT_ONE: Final = 0.02
 """An arm turns its tool about one axis, as a SCARA does, where turns about others are less than this part."""
 STILL: Final = 0.05

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.doubts.whitened import AXES, Whitened
+from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
 from truearm.lengths import length_mm
+from truearm.types import AXES, Mask
 from truearm.units import MM_PER_METRE
-
-Mask = NDArray[np.bool_]
 
 UNEVEN_SETUPS: Final = "uneven_setups"
 WORSE: Final = 2.0

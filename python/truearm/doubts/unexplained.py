@@ -1,17 +1,11 @@
 """What is left when the model has said all it knows: noise of the instrument and of the joints."""
 
-from typing import Final
-
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import FieldFit
 from truearm.fits.fitting import Task
 from truearm.measurements import Measurements
-
-Floats = NDArray[np.float64]
-
-AXES: Final = 3
+from truearm.types import AXES, Floats
 
 
 def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:

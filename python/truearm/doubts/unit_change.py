@@ -3,14 +3,12 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_INCH, MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 FACTORS: Final = (
     (MM_PER_INCH, "millimetres and inches"),

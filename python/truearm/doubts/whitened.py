@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import setup_jacobian
 from truearm.calibration import Calibration
@@ -22,12 +21,8 @@ from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rows.shots import Scatter
 from truearm.rows.visits import means, visit_numbers
+from truearm.types import AXES, Floats, Mask, Rows
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
-AXES: Final = 3
 MOST_VALUES: Final = 900
 """Coordinates at the most that are looked at: they tell enough, and their covariance is quick."""
 TRUSTED: Final = 0.5

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import CoreError, fit_constant
 from truearm.fits.core_set import anchor_names, core_set, distances_apart
@@ -13,11 +12,8 @@ from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitting import Task, fit_options
 from truearm.fits.measured_parts import LEAST_LEFT_M
 from truearm.measurements import Measurements
+from truearm.types import AXES, Floats, Mask
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-AXES: Final = 3
 STEP_M: Final = 1e-3
 """How far lengths are moved to see what follows."""
 ENOUGH_M: Final = 1e-6

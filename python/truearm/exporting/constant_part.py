@@ -3,15 +3,11 @@
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.calibration import Calibration
 from truearm.description.dh_row import row_transform
 from truearm.fits.models import CONSTANT
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 HASH_DIGITS: Final = 12
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.calibration import Calibration
 from truearm.errors import UsageError, WorkError
@@ -18,9 +18,8 @@ from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
 from truearm.storage.summary import WAVE, describe_blocks, waves_in_words
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 POINTS: Final = 5
 LARGEST: Final = 2_000_000

@@ -5,14 +5,12 @@ from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.robot_data import RobotData
 from truearm.description.urdf_names import UrdfNames
 from truearm.exporting.losses import is_directed
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 WITHOUT_LIMITS_M: Final = 1000.0
 

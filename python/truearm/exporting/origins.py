@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_row import row_transform
 from truearm.description.robot_data import RobotData
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def joint_origins(robot: RobotData) -> tuple[list[Floats], Floats]:

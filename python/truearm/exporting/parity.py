@@ -4,12 +4,11 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import WorkError
 from truearm.robot import Robot
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Poses = Callable[[Floats], Floats]
 
 WITHIN_M: Final = 1e-9

@@ -6,7 +6,6 @@ from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.description.dh_from_axes import Axis
 from truearm.description.joint_axes import axes_at_zero
@@ -18,8 +17,7 @@ from truearm.errors import WorkError
 from truearm.exporting.losses import is_directed
 from truearm.exporting.new_urdf import set_origin
 from truearm.rotations import matrix_from_euler, matrix_from_rotation_vector, rigid_inverse
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 SAME: Final = 1e-12
 DEFAULT_AXIS: Final = "1 0 0"

@@ -6,14 +6,11 @@ import json
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import checked, flange_poses
 from truearm.fits.parameters import KINDS
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
 
 UNITS: Final = ("rad", "m", "m", "rad", "rad")
 COLUMNS: Final = tuple(f"{kind}_{unit}" for kind, unit in zip(KINDS, UNITS, strict=True))

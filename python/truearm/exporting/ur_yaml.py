@@ -5,7 +5,6 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.exporting.losses import as_comments
@@ -13,9 +12,8 @@ from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.exporting.parity import checked
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
+from truearm.types import Floats
 from truearm.ur_kinematics import LINKS, NUMBERS, URDF_CONVENTION, has_ur_structure, robot_from_yaml
-
-Floats = NDArray[np.float64]
 
 NOTHING: Final = 1e-12
 

@@ -14,9 +14,8 @@ from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
 from truearm.rows.used_distances import holds_distances
+from truearm.types import Floats, Rows
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Use = Literal["position", "pose", "targets"]
 
 POSITION: Final = "position"

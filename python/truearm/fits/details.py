@@ -4,15 +4,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm._core import ConstantFit
 from truearm.arrays import hold_read_only
 from truearm.fits.known_scale import KnownScale
 from truearm.lengths import length_mm
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 @dataclass(frozen=True, eq=False)

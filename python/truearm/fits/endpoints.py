@@ -5,18 +5,17 @@ from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, check_finite, rigid
 from truearm.errors import InputError, UsageError, WorkError, did_you_mean, list_names
 from truearm.kinds import check_number
 from truearm.robot import Robot
 from truearm.rotations import rigid_motion
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,12 @@ from truearm.fits.core_set import Selection, distance_ends
 from truearm.fits.fitting import Fits, constant_variances
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
-Floats = NDArray[np.float64]
 
 UNUSED: Final = 0
 TRAINED: Final = 1

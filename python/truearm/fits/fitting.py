@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import (
     ConstantFit,
@@ -32,11 +31,11 @@ from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.rows.visits import one_row_a_pose
 from truearm.stages import Stages, no_stages
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm._core import ConstantOptions, FieldOptions
 
-Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
 
 ENOUGH_FOR_HYPER: Final = 400

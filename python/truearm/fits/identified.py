@@ -5,14 +5,13 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.fits.parameters import PARALLEL_WITHIN_DEG, Candidates, candidates
 from truearm.kinds import required
 from truearm.robot import Robot
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Frame = Literal["free", "world"]
 
 

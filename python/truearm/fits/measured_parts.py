@@ -11,10 +11,9 @@ from truearm.arrays import hold_read_only
 from truearm.errors import InputError
 from truearm.fits.core_set import Selection
 from truearm.measurements import Measurements
+from truearm.types import Floats, Mask
 
 Counts = NDArray[np.int64]
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEAST_LEFT_M: Final = 1e-9
 """No row is known better than this."""

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Field, Setup
 from truearm.arrays import hold_read_only
 from truearm.errors import UsageError
 from truearm.fits.schemes import Scheme, add_ceps
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 NOMINAL: Final = "nominal"
 CONSTANT: Final = "constant"

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import UsageError, did_you_mean, list_names
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 KINDS: Final = ("theta", "d", "a", "alpha", "beta")
 THETA, D, A, ALPHA, BETA = range(5)

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import (
     ANGLE_ARM_M,
@@ -23,12 +22,12 @@ from truearm.fits.parameters import are_lengths
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.fits.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
 from truearm.fits.stillness import still_joints, still_words
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm._core import DivisionOptions, NetworkFitOptions, RegionalOptions
 
-Floats = NDArray[np.float64]
 
 JUDGING_SHARE: Final = 0.2
 LARGEST_CONDITION_OF_WHOLE: Final = 300.0

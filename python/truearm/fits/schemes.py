@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Network, Regions
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm._core import NetworkOptions
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 REGIONS: Final = "regions"

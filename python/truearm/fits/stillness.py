@@ -4,11 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 STILL_DEG: Final = 0.5
 """More than what a controller that stops where it is told to differs by, less than what anybody measures."""

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.doubts.nominal_misfit import some_rows
@@ -17,9 +16,8 @@ from truearm.fits.parameters import are_lengths
 from truearm.fleet.gauge import as_placed_in
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 SURE: Final = 2.0
 """A change of a position beyond so many standard deviations of both calibrations together is seen."""

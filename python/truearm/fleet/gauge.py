@@ -5,12 +5,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.fits.parameters import KIND_COUNT
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 TAKEN_OVER: Final = 0.01
 """Base and tool take over what a parameter does to the points where they leave less than this of it."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, check_finite, rotation_fault
 from truearm.calibration import Calibration
@@ -21,8 +21,7 @@ from truearm.framing.touching import tool_from_touches
 from truearm.kinds import required
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 BEHIND_FLANGE: Final = (0.0, 0.0, -0.1, 1.0)
 """A point of the wrist in the flange's frame, m."""

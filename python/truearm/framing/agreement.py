@@ -3,17 +3,14 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtri
 
 from truearm.errors import InputError, Notice, WorkError, list_rows
 from truearm.lengths import length_mm
 from truearm.registration import register
 from truearm.rows.leaving_out import left_out
+from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 CHANCE: Final = 1e-3
 """That a row is named although all are as good as each other."""

@@ -1,13 +1,9 @@
 """Where the calibrated arm puts a tool in measured rows."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.calibration import Calibration
 from truearm.fits.fitting import feature_values
 from truearm.measurements import Measurements
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def calibrated_poses(calibration: Calibration, data: Measurements, flange_from_tool: Floats) -> Floats:

@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 import tomli_w
 import tomlkit
-from numpy.typing import NDArray
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Item
 
@@ -19,9 +18,8 @@ from truearm.programs.environment import Frame
 from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, WORLDS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
 from truearm.strictly import strictly
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 PLACEMENT: Final = ("xyz", *ORIENTATIONS)
 FORMAT: Final = 1

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from truearm.errors import Notice
 from truearm.rotations import quaternion_from_matrix, rigid_inverse
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
 Kind = Literal["tool", "object"]
 
 

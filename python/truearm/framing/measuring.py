@@ -1,7 +1,6 @@
 """A tool from measured poses or points of it: where the device stands is found along with it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.doubts.turning_sense import check_turns
@@ -16,8 +15,7 @@ from truearm.framing.turning import check_turned
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_motion
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def tool_from_measurements(

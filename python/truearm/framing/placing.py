@@ -10,8 +10,7 @@ from truearm.framing.agreement import check_agreement, check_places, far_rows, t
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.registration import register
 from truearm.rotations import rigid_motion
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 FEWEST: Final = 3
 LEAST_SPREAD_M: Final = 1e-3

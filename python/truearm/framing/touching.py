@@ -14,8 +14,7 @@ from truearm.errors import WorkError, count_of
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.framing.turning import check_turned
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 FEWEST: Final = 4
 

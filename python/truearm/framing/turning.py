@@ -3,11 +3,9 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import WorkError
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 LEAST_TURN_DEG: Final = 3.0
 

@@ -13,9 +13,9 @@ from truearm.errors import count_of, list_names
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
 from truearm.rows.visits import pose_numbers
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 FEWEST_POSES: Final = 2

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.errors import InputError, Notice, count_of, list_names
@@ -16,9 +15,7 @@ from truearm.fits.measured_parts import held_parts
 from truearm.fits.models import ArmModel
 from truearm.judgement.validation import RowErrors, row_errors
 from truearm.measurements import Measurements
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 UNUSUAL: Final = 9.0
 """Times the median distance from the median point: what is farther off is no measurement of the target."""

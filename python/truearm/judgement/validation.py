@@ -15,8 +15,7 @@ from truearm.fits.details import DriftDetails
 from truearm.fits.identified import IdentifiedArm
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 MILLI = 1e-3
 FEW_HELD = 30

@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, as_rows
 from truearm.description.joint_axes import axes_at_zero
@@ -15,9 +15,7 @@ from truearm.fits.endpoints import at_tool
 from truearm.kinds import check_number, check_values
 from truearm.planning.configurations import link_frames
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 LEAST_CONTACT_DEG: Final = 15.0
 UPRIGHT_COSINE: Final = np.cos(np.deg2rad(1.0))

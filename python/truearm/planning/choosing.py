@@ -15,11 +15,11 @@ from truearm.fits.core_set import known_setup, measured_points
 from truearm.fits.endpoints import at_tool
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.parameters import THETA, D
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm import _core
 
-Floats = NDArray[np.float64]
 Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]
 
 CRITERIA: Final = ("kappa", "d", "o1", "o2", "o3", "o4", "o5")

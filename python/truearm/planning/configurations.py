@@ -10,8 +10,7 @@ from truearm._core import Chain
 from truearm.errors import UsageError
 from truearm.kinds import check_values
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 FEWEST_JOINTS: Final = 3
 WORDS: Final = {"arm": ("front", "back"), "elbow": ("up", "down"), "wrist": ("noflip", "flip")}

@@ -17,12 +17,12 @@ from truearm.fits.core_set import known_setup
 from truearm.fits.identified import IdentifiedArm
 from truearm.planning.choosing import CRITERIA, Criterion, check_some
 from truearm.planning.workspace import Workspace
+from truearm.types import Floats
 
 if TYPE_CHECKING:
     from truearm import _core
     from truearm._core import MeasuringOptions
 
-Floats = NDArray[np.float64]
 
 INTEGER_ARRAYS: Final = ("axis", "child")
 FORMAT: Final = "truearm division 1"

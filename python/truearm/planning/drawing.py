@@ -10,12 +10,12 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from numpy.typing import NDArray
 
 from truearm.planning.spaces import CartesianSpace, Space, SphericalSpace
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm._core import Regions
 
-Floats = NDArray[np.float64]
 
 EDGE_POINTS: Final = 12
 NAMED_LEAVES: Final = 40

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.kinds import check_values
-from truearm.planning.accessibility import Mask, Places
-
-Floats = NDArray[np.float64]
+from truearm.planning.accessibility import Places
+from truearm.types import Floats, Mask
 
 SHORTEST_LINK_M: Final = 1e-6
 JOINED: Final = 2.0

@@ -7,12 +7,10 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truearm.planning.accessibility import Mask, Places, Rule, lowest
+from truearm.planning.accessibility import Places, Rule, lowest
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats, Mask
 
 STEP_RAD: Final = np.deg2rad(1.0)
 STEP_M: Final = 5e-3

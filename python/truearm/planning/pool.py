@@ -6,14 +6,13 @@ from numbers import Integral
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm import kinds
 from truearm.errors import WorkError, count_of
 from truearm.planning.accessibility import Rule, accessible
 from truearm.planning.spaces import Space
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 DRAWS_PER_POSE: Final = 50
 """A region of which less than one draw in so many can be measured gives fewer poses than asked for."""

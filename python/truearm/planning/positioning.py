@@ -6,15 +6,12 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from truearm.planning.configurations import Configuration
 from truearm.robot import Robot
+from truearm.types import Floats, Mask
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 STARTS: Final = 20_000
 STARTS_TRIED: Final = 3

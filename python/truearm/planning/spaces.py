@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers
 from truearm.errors import UsageError
@@ -15,9 +15,7 @@ from truearm.kinds import required, whole_numbers
 from truearm.planning.configurations import Configuration
 from truearm.planning.positioning import PositionInverse
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from truearm.types import Floats, Mask
 
 
 class Space(Protocol):

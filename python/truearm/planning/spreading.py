@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 def fill(points: Floats, count: int) -> NDArray[np.int64]:

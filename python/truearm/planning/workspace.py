@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet
 from truearm.errors import InputError
@@ -12,8 +11,8 @@ from truearm.fits.core_set import measured_points
 from truearm.planning.accessibility import Rule
 from truearm.planning.pool import PoolOptions, draw_pool
 from truearm.planning.spaces import Space
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Measure = Callable[[Floats], Floats]
 
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.errors import InputError
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import FULL_TURN
 
-Floats = NDArray[np.float64]
 MEET_M: Final = 1e-6
 PARALLEL: Final = 1e-6
 

@@ -8,15 +8,11 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.layouts import Layout
 from truearm.programs.tables import Targets
 from truearm.turns import EDGE_RAD
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from truearm.types import Floats, Integers, Mask
 
 ANY: Final = -(2**31)
 
@@ -43,7 +39,7 @@ class Configuration(Protocol):
 
 def meant(
     configuration: Configuration, wanted: Integers, candidates: Floats, edge_rad: Floats | float = EDGE_RAD
-) -> tuple[Bools, Bools]:
+) -> tuple[Mask, Mask]:
     """Which of the readings (m, N) agree with the digits (m, D) of their targets.
 
     Args:
@@ -58,8 +54,8 @@ def meant(
     if len(candidates) == 0:
         return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
     agrees = [configuration.digits(candidates + shift) == wanted for shift in (0.0, edge_rad, -edge_rad)]
-    exactly: Bools = ((wanted == ANY) | agrees[0]).all(axis=1)
-    found: Bools = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
+    exactly: Mask = ((wanted == ANY) | agrees[0]).all(axis=1)
+    found: Mask = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
     return exactly, found
 
 

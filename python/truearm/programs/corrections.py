@@ -2,13 +2,9 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.compensation import Compensated
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 class Compensator(Protocol):

@@ -27,10 +27,8 @@ from truearm.robot import Robot
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
 from truearm.tables.columns import QUATERNION, TARGET
 from truearm.tables.reading import DELIMITERS
+from truearm.types import Floats, Integers
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 VALUES: Final = NumberColumns._fields.index("values")
 

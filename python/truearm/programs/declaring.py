@@ -4,7 +4,6 @@ import re
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.controller import Controller
 from truearm.description.one_turn import one_turn
@@ -12,8 +11,6 @@ from truearm.errors import InputError, UsageError, WorkError
 from truearm.programs.program import Language, Program
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 UNIVERSAL: Final = (
     "Controllers of Universal Robots compute with the factory kinematics of the very arm (calibration.conf)"

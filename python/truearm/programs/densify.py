@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
 from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
-from truearm.programs.environment import Environment, Transform, author_of
+from truearm.programs.environment import Environment, author_of
 from truearm.programs.following import CLOSE_RAD, Follower, Line
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn
 from truearm.programs.listing import listed_move
@@ -20,11 +19,8 @@ from truearm.programs.program import LinearStep, Listed, Program, StepTexts
 from truearm.programs.tables import NOWHERE, Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
+from truearm.types import Floats, Integers, Mask, Transform
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 MOST_SAMPLES: Final = 4000
 WITHIN: Final = 4
@@ -134,7 +130,7 @@ class Densifier:
         self._follower = Follower(self._robot, inverse)
         self._deviation_mm: dict[int, float] = {}
 
-    def insert(self, nominal: Floats, changed: Bools, tell: Callable[[int, int], None]) -> Inserted:
+    def insert(self, nominal: Floats, changed: Mask, tell: Callable[[int, int], None]) -> Inserted:
         """Waypoints for every linear move between two changed targets.
 
         A move to a changed one from where the arm may be anywhere, as behind calls and at the heads of

@@ -17,10 +17,8 @@ from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.turns import with_turns
+from truearm.types import Floats, Integers
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 STEPS: Final = 4
 ALMOST: Final = 1e-9

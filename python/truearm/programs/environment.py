@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse, rigid_motion
-
-Transform = NDArray[np.float64]
+from truearm.types import Transform
 
 
 @dataclass(frozen=True, eq=False)

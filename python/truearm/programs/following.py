@@ -3,15 +3,12 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_rotation_vector, rigid_inverse, rotation_vector_from_matrix
 from truearm.turns import NearestTurns
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 UNFOLLOWED: Final = (
     "the way from the target before leads too near to a singularity, or out of the arm's reach, and does not "

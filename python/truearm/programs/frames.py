@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from truearm.errors import InputError
 from truearm.files import as_path, parsed, read_text
-from truearm.programs.environment import Frame, Transform
+from truearm.programs.environment import Frame
 from truearm.rotations import (
     UNIT_TOLERANCE,
     matrix_from_euler,
@@ -22,6 +22,7 @@ from truearm.rotations import (
     transform_from_parts,
 )
 from truearm.strictly import strictly
+from truearm.types import Transform
 
 Kind = Literal["tool", "object"]
 Written = TypeVar("Written", bound=Hashable)

@@ -7,13 +7,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from truearm.programs.environment import Frame, Transform
+from truearm.programs.environment import Frame
 from truearm.programs.frames import KRL_WORLD, Frames, name_at_start, written_out
 from truearm.programs.krl_order import Order
 from truearm.programs.krl_routines import Routines
 from truearm.programs.krl_storage import WORLD_SET_BY, KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
+from truearm.types import Transform
 
 REMOTE: Final = "the workpiece is on the arm and the tool stands still (#TCP)"
 CALLED: Final = "a subroutine was called since it was set, and may have set another"

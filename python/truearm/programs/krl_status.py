@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.branches import Branches
 from truearm.programs.configuration import ANY
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 STATUS_BITS, TURN_BITS = 3, 6
 STATUS_WEIGHTS: Final = 2 ** np.arange(STATUS_BITS)

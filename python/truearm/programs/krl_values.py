@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.lexing import NUMBER, Reader, Token, tokens
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Number
 from truearm.rotations import matrix_from_euler
-
-Transform = NDArray[np.float64]
+from truearm.types import Transform
 
 TOKENS: Final = re.compile(
     rf'(?P<string>"[^"\r\n]*"?)|(?P<bits>\'[BbHh][0-9A-Fa-f]+\')|(?P<name>[A-Za-z_$][\w$]*)|(?P<number>{NUMBER})|;[^\r\n]*'

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Final, Protocol, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.rotations import (
     euler_from_matrix,
@@ -15,9 +14,8 @@ from truearm.rotations import (
     quaternion_from_matrix,
     rotation_vector_from_matrix,
 )
+from truearm.types import Floats
 from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 HALF_TURN_DEG: Final = 180.0
 LOCKED: Final = 1e-7

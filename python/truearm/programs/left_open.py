@@ -1,17 +1,14 @@
 """What tools and work objects that were taught leave open of where a target is."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.environment import Environment, Frame
 from truearm.programs.program import Program
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse, rigid_motion
+from truearm.types import Floats, Integers
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def left_open_mm(

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.branches import Branches
 from truearm.programs.configuration import ANY
 from truearm.programs.turning import turns
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 RIGHT, ABOVE, NON_FLIP = 4, 2, 1
 POSTURE: Final = RIGHT | ABOVE | NON_FLIP

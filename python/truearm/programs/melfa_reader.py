@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.environment import IDENTITY, Environment, Frame
 from truearm.programs.frames import Frames, name_at_start, written_out
@@ -26,8 +25,8 @@ from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
+from truearm.types import Transform
 
-Transform = NDArray[np.float64]
 Kind = Literal["tool", "base"]
 
 _KINDS: Final = {

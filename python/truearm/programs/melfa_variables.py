@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from truearm.programs.environment import Transform
 from truearm.programs.layouts import EulerPose
 from truearm.programs.melfa_text import (
     NAME,
@@ -23,6 +22,7 @@ from truearm.programs.melfa_text import (
     name_of,
 )
 from truearm.programs.source import Source
+from truearm.types import Transform
 
 FLAGS: Final = 2
 FLAGGED: Final = EulerPose(columns=(2, 1, 0), configuration=FLAGS)

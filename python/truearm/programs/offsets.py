@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import Notice, count_of
 from truearm.programs.configuration import ANY
@@ -20,11 +19,8 @@ from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
+from truearm.types import Floats, Integers, Mask
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 ALSO_OFFSET: Final = (
     "it is used as it stands and with offsets, and one change cannot suit them all exactly; --offsets-mm "
@@ -92,7 +88,7 @@ class Offsets:
         apart = replace(program, targets=targets, moves=moves_now)
         return cls(apart, Uses.of(apart, whole_poses=whole_poses), stands_for, count + np.arange(len(places)))
 
-    def judged(self, known: Bools, corrected: Floats, controller: Robot, largest_mm: float) -> "Judged":
+    def judged(self, known: Mask, corrected: Floats, controller: Robot, largest_mm: float) -> "Judged":
         """Whether the change of a target for its use as it stands suits its uses with offsets.
 
         Args:
@@ -136,7 +132,7 @@ class Offsets:
         turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)
         return MM_PER_METRE * float(far_m.max()), MRAD_PER_RAD * float(turn_rad.max())
 
-    def _heeding(self) -> Bools:
+    def _heeding(self) -> Mask:
         """Targets at which the controller may heed configuration data, (t,)."""
         moves = self.program.moves
         unheeded = np.zeros(len(moves), dtype=bool)

@@ -1,17 +1,15 @@
 """Where a path steps: between corrected targets and places that are left as they are."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import Notice, count_of
 from truearm.programs.listing import listed_target
 from truearm.programs.program import Program, Unplaced, motion_is_straight
 from truearm.programs.uses import Uses
+from truearm.types import Mask
 
-Bools = NDArray[np.bool_]
 
-
-def step_notices(program: Program, uses: Uses, changed: Bools) -> tuple[Notice, ...]:
+def step_notices(program: Program, uses: Uses, changed: Mask) -> tuple[Notice, ...]:
     """A warning where straight or blended motion leads past what is left between changed targets, (t,)."""
     along = uses.moved & (uses.straight | uses.blended)
     left = np.flatnonzero(along & ~changed)
@@ -29,7 +27,7 @@ def step_notices(program: Program, uses: Uses, changed: Bools) -> tuple[Notice, 
     return (Notice("steps", text, tuple(sorted(lines))),)
 
 
-def _steps(program: Program, one: Unplaced, changed: Bools) -> bool:
+def _steps(program: Program, one: Unplaced, changed: Mask) -> bool:
     """Whether the moves beside a motion lead to a changed target, and one of them or it shows the step."""
     moves = program.moves
     here = np.flatnonzero(moves.moving & (moves.source == one.file))

@@ -5,9 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.programs.configuration import Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.frames import Frames
@@ -15,9 +12,7 @@ from truearm.programs.layouts import JointLayout, Layout, PoseLayout
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Moves, Targets, all_ones
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 
 @dataclass(frozen=True, order=True)

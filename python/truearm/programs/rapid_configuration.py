@@ -9,13 +9,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.branches import Branches
 from truearm.programs.configuration import ANY
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 QUARTER: Final = np.pi / 2.0
 AXES: Final = (0, 3, 5)

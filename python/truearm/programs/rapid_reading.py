@@ -9,7 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
-from truearm.programs.environment import Environment, Transform
+from truearm.programs.environment import Environment
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
 from truearm.programs.gathered import Gathered
@@ -43,6 +43,7 @@ from truearm.programs.rapid_values import (
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.robot import Robot
+from truearm.types import Transform
 
 if TYPE_CHECKING:
     from truearm.programs.rapid import RAPID

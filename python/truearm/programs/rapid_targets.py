@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from truearm.programs.environment import Transform
 from truearm.programs.folding import constant
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.listing import DIMENSIONS
@@ -23,6 +22,7 @@ from truearm.programs.rapid_values import (
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Number, TargetTable
 from truearm.rotations import matrix_from_euler
+from truearm.types import Transform
 
 OF_JOINTS, OF_POSES = 0, 1
 PARTS: Final = {

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.lexing import NUMBER, Reader, Token, tokens
 from truearm.programs.source import Source
 from truearm.programs.tables import Number
 from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
-
-Transform = NDArray[np.float64]
+from truearm.types import Transform
 
 TOKENS: Final = re.compile(
     rf'(?P<string>"[^"\r\n]*"?)|(?P<name>[A-Za-z]\w*)|(?P<number>{NUMBER})|![^\r\n]*'

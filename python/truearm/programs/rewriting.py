@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.compensation import Refusal
 from truearm.controller import Controller
@@ -18,7 +17,7 @@ from truearm.programs.corrections import Compensator
 from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
-from truearm.programs.environment import Frame, Transform, author_of
+from truearm.programs.environment import Frame, author_of
 from truearm.programs.frames import Frames
 from truearm.programs.helping import (
     FRAMES_UNSURE,
@@ -40,10 +39,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import placed, run_of
 from truearm.programs.uses import SEVERAL, Uses, target_count
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from truearm.types import Floats, Integers, Mask, Transform
 
 NO_SMALL_CHANGE: Final = (*NOT_REACHED, TOO_FAR)
 STRETCHED: Final = "it lies at a singularity, where no small change of the joints makes the correction"
@@ -154,7 +150,7 @@ class Rewritten:
     contents: tuple[bytes, ...]
     nominal: Floats
     corrected: Floats
-    changed: Bools
+    changed: Mask
     correction_mm: Floats
     correction_mrad: Floats
     std_mm: Floats
@@ -248,7 +244,7 @@ def rewrite(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
     # A product with ones would leave threads of BLAS that spin for a while in the way of the corrections.
-    known: Bools = np.isfinite(np.einsum("ij->i", solved.q))
+    known: Mask = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False
     known &= uses.moved
     state = _State(program, uses, models, solved.q, known, tell, given)
@@ -289,7 +285,7 @@ class _State:
     uses: Uses
     models: Models
     nominal: Floats
-    known: Bools
+    known: Mask
     tell: Tell
     given: _Given
     reasons: dict[int, str] = field(default_factory=dict)
@@ -354,7 +350,7 @@ class _State:
                 self.refused[target] = refusal.reason
                 self.codes.add(refusal.code)
 
-    def _judge_std(self, which: Integers, std_mm: Floats, refused: Bools, tool: Frame) -> Bools:
+    def _judge_std(self, which: Integers, std_mm: Floats, refused: Mask, tool: Frame) -> Mask:
         """Take over standard deviations of targets, with tool and work object; which are too large."""
         rows, largest = run_of(which), self.models.largest_std_mm
         robot = self.models.programming
@@ -469,7 +465,7 @@ class _State:
             ),
         )
 
-    def _inserted(self, suited: Bools, spacing: Spacing | None) -> Inserted:
+    def _inserted(self, suited: Mask, spacing: Spacing | None) -> Inserted:
         if spacing is None:
             return Inserted(StepTexts(), ())
         models, controller = self.models, self.models.controller
@@ -478,7 +474,7 @@ class _State:
         densifier = Densifier(self.program, of_models, encoder, spacing)
         return densifier.insert(self.nominal, suited, lambda done, all_: self.tell("lines", done, all_))
 
-    def _forget(self, unchanged: Bools) -> None:
+    def _forget(self, unchanged: Mask) -> None:
         if not unchanged.any():
             return
         rows, nothing = np.flatnonzero(unchanged), np.full(int(unchanged.sum()), np.nan)

@@ -3,16 +3,13 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.layouts import PoseLayout, of_pose
 from truearm.programs.program import Program, numbers_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rotation_vector_from_matrix
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from truearm.types import Floats, Integers
 
 LENGTHS: Final = 3
 

@@ -1,14 +1,13 @@
 """The lines of a text, those that are equal but for their numbers as one kind, and numbers in columns."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import read_numbers, scan_lines
-
-Integers = NDArray[np.integer[Any]]
+from truearm.types import Whole
 
 
 class NumberColumns(NamedTuple):
@@ -44,7 +43,7 @@ class Scan:
         """All numbers of a line, (1, k)."""
         return self._read(self._numbers[None, self._first_number[line] : self._first_number[line + 1]])
 
-    def columns(self, lines: Integers, places: Sequence[int]) -> NumberColumns:
+    def columns(self, lines: Whole, places: Sequence[int]) -> NumberColumns:
         """The numbers at some places, counted from 0 in each line, of lines (n,) of one kind."""
         first, last = int(lines[0]), int(lines[-1]) + 1
         start, stop = places[0], places[0] + len(places)

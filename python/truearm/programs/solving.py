@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, meant
@@ -22,11 +21,8 @@ from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
 from truearm.turns import EDGE_RAD, NearestTurns, with_turns
+from truearm.types import Floats, Integers, Mask
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 OUT_OF_REACH: Final = "the nominal arm does not reach it"
 NO_BRANCH: Final = "the nominal arm does not reach it in the configuration that it states"
@@ -103,8 +99,8 @@ class _Named(NamedTuple):
     """
 
     q: Floats
-    singular: Bools
-    exact: Bools
+    singular: Mask
+    exact: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +116,7 @@ class _Possible:
     """
 
     branches: Floats
-    at_singularity: Bools
+    at_singularity: Mask
     named: _Named | None
     flange: Floats | None = None
 
@@ -167,7 +163,7 @@ class _Solver:
             self._refuse(here & self.uses.of_joints, environment.problem)
             self._refuse(here & ~self.uses.of_joints, environment.why_not_poses)
 
-    def _refuse(self, which: Bools, reason: str) -> None:
+    def _refuse(self, which: Mask, reason: str) -> None:
         if reason:
             for target in np.flatnonzero(which & ~self.uses.several):
                 self.reasons.setdefault(int(target), reason)
@@ -212,7 +208,7 @@ class _Solver:
             return {number: _Possible(*nothing, poses[number]) for number in some.tolist()}
         branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
         named = self._named(some, branches)
-        reached: Bools = np.asarray(np.isfinite(branches).all(axis=2))
+        reached: Mask = np.asarray(np.isfinite(branches).all(axis=2))
         at_singularity = np.zeros(reached.shape, dtype=bool)
         at_singularity[reached] = are_singular(self.robot, branches[reached])
         return {
@@ -243,8 +239,8 @@ class _Solver:
         return found
 
     def _near(
-        self, some: Integers, rows: Integers, candidates: Floats, wanted: Integers, exact: Bools
-    ) -> Bools:
+        self, some: Integers, rows: Integers, candidates: Floats, wanted: Integers, exact: Mask
+    ) -> Mask:
         """Which candidates (m, N) of the targets `some[rows]` are left where several agree with their data,
         not all of them exactly: those that do within what the rounding of the text and the controller's
         arithmetic leave open, if there are any.
@@ -421,7 +417,7 @@ def is_nearest(found: Floats, candidates: Floats, before: Floats) -> bool:
     return bool(np.abs(found - before).max() <= nearest + SAME_RAD)
 
 
-def are_singular(robot: Robot, q: Floats) -> Bools:
+def are_singular(robot: Robot, q: Floats) -> Mask:
     """Where a small change of the pose asks for a large one of the joints, (n,) (six axes or more)."""
     if robot.joint_count < 6 or len(q) == 0:
         return np.zeros(len(q), dtype=bool)

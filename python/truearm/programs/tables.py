@@ -13,9 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Integers = NDArray[np.int64]
-Whole = NDArray[np.integer[Any]]
-Floats = NDArray[np.float64]
+from truearm.types import Floats, Integers, Whole
 
 ABSENT_AT: Final = -1
 NOWHERE: Final = -1

@@ -17,17 +17,14 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.branches import Branches
 from truearm.programs.configuration import ANY
 from truearm.programs.layouts import EulerPose
 from truearm.programs.turning import ON_THE_EDGE, turns
 from truearm.robot import Robot
+from truearm.types import Floats, Integers
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LETTERS: Final = ("NF", "UD", "TB")
 ORDERS: Final = ((0, 3, 5), (3, 4, 5))

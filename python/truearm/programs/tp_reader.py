@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.branches import Branches
 from truearm.programs.environment import Environment, Frame
@@ -19,8 +18,7 @@ from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, line_
 from truearm.programs.tp_registers import StatedFrames
 from truearm.programs.tp_state import JUMPS, OFFSET, SENSED, Current, moved_at
 from truearm.robot import Robot
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")

@@ -3,12 +3,9 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truearm.types import Floats, Integers
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 EDGE_RAD: Final = 2e-5
 ON_THE_EDGE: Final = 2**20

@@ -12,14 +12,12 @@ from collections.abc import Callable, Set
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.layouts import RotationVectorPose
 from truearm.programs.urscript_scopes import Scopes
 from truearm.programs.urscript_syntax import Node
 from truearm.rotations import rigid_inverse
-
-Transform = NDArray[np.float64]
+from truearm.types import Transform
 
 AXES: Final = 6
 _POSE: Final = RotationVectorPose()

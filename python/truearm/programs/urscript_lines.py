@@ -5,7 +5,7 @@ Lines that are equal but for their numbers are read once; their numbers come as 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import AXES, RunTime
 from truearm.programs.urscript_places import argument, numbers_of
 from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
-
-Integers = NDArray[np.integer[Any]]
+from truearm.types import Whole
 
 JOINTS, POSE = 0, 1
 FEW: Final = 4
@@ -50,15 +49,15 @@ class Columns(NamedTuple):
         factors: pi/180 for those within d2r( ), else 1.
     """
 
-    at: Integers
-    leaf: Integers
-    layout: Integers
-    motion: Integers
+    at: Whole
+    leaf: Whole
+    layout: Whole
+    motion: Whole
     blended: NDArray[np.bool_]
-    starts: Integers
-    ends: Integers
+    starts: Whole
+    ends: Whole
     values: NDArray[np.float64]
-    decimals: Integers
+    decimals: Whole
     factors: NDArray[np.float64]
 
 
@@ -98,7 +97,7 @@ class Lines:
         for first, last in edges.reshape(-1, 2):
             yield int(self._scan.starts[first]), int(self._scan.starts[last])
 
-    def places(self) -> Integers:
+    def places(self) -> Whole:
         """Offsets of the motions that fill their lines."""
         each = [
             self._scan.starts[np.flatnonzero(self._scan.kind == number)] + template.at
@@ -111,7 +110,7 @@ class Lines:
         for number, template in self._templates.items():
             yield self._columns(template, np.flatnonzero(self._scan.kind == number))
 
-    def _columns(self, template: _Template, lines: Integers) -> Columns:
+    def _columns(self, template: _Template, lines: Whole) -> Columns:
         numbers = self._scan.columns(lines, template.places)
         blended = np.full(len(lines), template.blended)
         if template.radius is not None:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.programs.tables import Number
 from truearm.programs.urscript_constants import (
@@ -17,9 +16,8 @@ from truearm.programs.urscript_constants import (
 )
 from truearm.programs.urscript_syntax import Node
 from truearm.rotations import rigid_inverse
+from truearm.types import Transform
 from truearm.units import RADIANS_PER_DEGREE
-
-Transform = NDArray[np.float64]
 
 _DEEPEST: Final = 20
 _DEEPEST_LEAVES: Final = 120

@@ -17,8 +17,7 @@ from truearm.programs.urscript_constants import AXES, RunTime
 from truearm.programs.urscript_flow import UNSURE, State, states
 from truearm.programs.urscript_lines import JOINTS, POSE, Columns
 from truearm.programs.urscript_places import Place, Places, numbers_of
-
-Integers = NDArray[np.int64]
+from truearm.types import Integers
 
 ALSO_A_FRAME: Final = "it is also an offset, or a frame, of another target"
 

@@ -5,15 +5,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truearm.programs.environment import Environment, Transform
+from truearm.programs.environment import Environment
 from truearm.programs.layouts import of_joints
 from truearm.programs.program import Program, motion_is_straight
 from truearm.programs.tables import Motion, run_of
-
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from truearm.types import Integers, Mask, Transform
 
 UNUSED: Final = "no motion goes there"
 CURVED: Final = np.array([motion_is_straight(motion) for motion in Motion])
@@ -39,17 +36,17 @@ class Uses:
         blended: Targets that are passed without a stop, or next to one that is, (t,).
     """
 
-    moved: Bools
-    mentioned: Bools
+    moved: Mask
+    mentioned: Mask
     environment: Integers
     tool_of: Integers
     tools: tuple[int, ...]
     displaced: Integers
     displacements: tuple[Transform | None, ...]
-    several: Bools
-    of_joints: Bools
-    straight: Bools
-    blended: Bools
+    several: Mask
+    of_joints: Mask
+    straight: Mask
+    blended: Mask
 
     @classmethod
     def of(cls, program: Program, *, whole_poses: bool = True) -> "Uses":
@@ -98,7 +95,7 @@ def target_count(program: Program) -> int:
     return len(program.targets) - len(seeds)
 
 
-def _all_or(chosen: Bools) -> slice | Bools:
+def _all_or(chosen: Mask) -> slice | Mask:
     """Chosen rows; all of them as a slice, which copies nothing."""
     return slice(None) if chosen.all() else chosen
 
@@ -139,7 +136,7 @@ def _displacements(program: Program) -> tuple[Integers, tuple[Transform | None, 
     return np.array([*numbers, 0], dtype=np.int64), tuple(found)
 
 
-def _single(values: Integers, targets: slice | Integers, count: int) -> tuple[Integers, Bools]:
+def _single(values: Integers, targets: slice | Integers, count: int) -> tuple[Integers, Mask]:
     """For each target the value of its uses, -1 without any, and whether they differ."""
     last = np.full(count, -1, dtype=np.int64)
     last[targets] = values
@@ -149,7 +146,7 @@ def _single(values: Integers, targets: slice | Integers, count: int) -> tuple[In
     return last, several
 
 
-def _along(program: Program, real: slice | Bools) -> tuple[Bools, Bools]:
+def _along(program: Program, real: slice | Mask) -> tuple[Mask, Mask]:
     """Targets at either end of a straight move, and targets at or next to one that is passed."""
     moves, count = program.moves, len(program.targets)
     target = moves.target[real]

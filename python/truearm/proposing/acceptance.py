@@ -13,12 +13,11 @@ from truearm.calibration import Calibration
 from truearm.planning.spreading import fill, least_distance
 from truearm.proposing.candidates import Candidates
 from truearm.proposing.next_poses import check_count
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating import UpdateOptions
 from truearm.updating.scale import known_scale
 from truearm.updating.unknowns import arm_directions, arm_std, setup_std
-
-Floats = NDArray[np.float64]
 
 PAYLOAD_RAD: Final = 3e-4
 """What another payload bends a joint by where its weight has the longest lever."""

@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import TooFewError
@@ -14,9 +13,8 @@ from truearm.measurements import Measurements
 from truearm.proposing.candidates import Candidates
 from truearm.proposing.next_poses import deviation_mm
 from truearm.rotations import quaternion_from_matrix
+from truearm.types import Floats
 from truearm.updating import UpdateOptions, update
-
-Floats = NDArray[np.float64]
 
 PREDICTED: Final = "as predicted"
 

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, linearise, setup_jacobian
 from truearm.arrays import as_rows
@@ -16,16 +15,12 @@ from truearm.errors import UsageError, WorkError, count_of, list_names
 from truearm.fits.core_set import Selection, measured_points
 from truearm.fits.enough_values import setup_unknowns
 from truearm.kinds import required
+from truearm.types import AXES, Floats, Mask
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import usual_sigma_m
 
 if TYPE_CHECKING:
     from truearm import _core
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-AXES = 3
 
 
 @dataclass(frozen=True, eq=False)

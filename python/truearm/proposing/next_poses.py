@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from truearm._core import choose_informative
 from truearm.errors import WorkError
 from truearm.kinds import required
-from truearm.proposing.candidates import AXES, Candidates
+from truearm.proposing.candidates import Candidates
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,15 +4,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.fits.parameters import A, D
 from truearm.reporting.numbers import lean
 from truearm.robot import Robot
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 
 def link_path(robot: Robot, readings: Floats, end: Floats) -> tuple[Floats, Floats]:

@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.reporting.facts import OUTER, Facts
 from truearm.reporting.numbers import listed
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm.reporting.numbers import lean
 from truearm.reporting.style import PLAIN, SEQUENTIAL, colour_of, dash_of, marker_of
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Trace = dict[str, Any]
 
 EVERY_NAME: Final[Mapping[str, Any]] = {"tickmode": "linear", "dtick": 1, "tickfont": {"size": 9}}

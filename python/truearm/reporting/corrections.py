@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.compensation import Compensated
 from truearm.errors import count_of, short_names
@@ -19,11 +18,8 @@ from truearm.reporting.parameters import shifted
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.reporting.waypoints import Waypoints
 from truearm.rows.visits import pose_numbers
+from truearm.types import Floats, Mask, Rows
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 LARGEST: Final = 6
 

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.fits.models import VARIABLE
 from truearm.reporting.charts import EVERY_NAME, axis, band, colour_bar, line
@@ -15,8 +14,7 @@ from truearm.reporting.style import SEQUENTIAL
 from truearm.reporting.sweeps import deviations, feature_ends, moved_mm, own_name, sweep, swept_names
 from truearm.reporting.waves import strongest_wave
 from truearm.storage.summary import waves_in_words
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 SHOWN_ALONG: Final = 3
 """Parameters whose curves are shown for each joint and feature."""

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.fits.details import DriftDetails
 from truearm.fits.fitted_rows import FittedRows
@@ -14,9 +13,8 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import listed, short
 from truearm.reporting.parts import Figure
 from truearm.reporting.style import colour_of, marker_of
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 COORDINATES: Final = (("x", "nominal"), ("y", "constant"), ("z", "variable"))
 """Each in the manner of a model, which differ in colour, dash and symbol."""

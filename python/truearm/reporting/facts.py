@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Field
 from truearm.calibration import Calibration
@@ -23,9 +22,8 @@ from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.reporting.waypoints import Waypoints
 from truearm.storage.summary import WAVE, distance_at_floor_mm
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 OUTER: Final = 0.01
 """Share of the readings on either side that a joint's usual range leaves out."""

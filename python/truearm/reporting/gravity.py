@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain, non_negative_least_squares
 from truearm.doubts.of_results import UPRIGHT
@@ -14,9 +13,8 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import percent, short
 from truearm.reporting.parts import Figure
 from truearm.rotations import rigid_motion
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 POSES: Final = 800
 BINS: Final = 10

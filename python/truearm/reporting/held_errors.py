@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import count_of, short_names
 from truearm.judgement.held_rows import HeldRows
@@ -13,9 +12,8 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.reporting.style import colour_of, dash_of
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
-
-Floats = NDArray[np.float64]
 
 BINS: Final = 32
 DRAWN: Final = 1500

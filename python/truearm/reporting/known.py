@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.reporting.facts import Facts
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 MOST: Final = 1500
 FEWEST: Final = 300

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.certainty.standard_errors import of_covariance
 from truearm.errors import count_of
@@ -14,9 +13,8 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 LENGTHS: Final = ("d", "a")
 POSES: Final = 300

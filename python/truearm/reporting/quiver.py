@@ -14,9 +14,8 @@ from truearm.reporting.held_errors import vectors_mm
 from truearm.reporting.numbers import fixed, lean, short
 from truearm.reporting.parts import Choice, Figure
 from truearm.reporting.style import colour_of
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 MOST_ARROWS: Final = 400
 SHARE_OF_REACH: Final = 0.12

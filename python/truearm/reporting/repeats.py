@@ -18,9 +18,9 @@ from truearm.rows.visits import pose_numbers, visit_numbers
 from truearm.simulation import approach_in_sequence
 from truearm.storage.summary import states_sigma, whole_noise_mm
 from truearm.tables.columns import APPROACH, REPEAT
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 FEWEST_GROUPS: Final = 3

@@ -3,7 +3,6 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Field
 from truearm.fits.stillness import still_joints, still_words
@@ -14,8 +13,7 @@ from truearm.reporting.numbers import fixed, listed
 from truearm.reporting.parameters import effect_mm
 from truearm.reporting.parts import Choice, Figure, Part, Text
 from truearm.reporting.style import DIVERGING
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 BLOCK: Final = "major"
 GRID: Final = 28

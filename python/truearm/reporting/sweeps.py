@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import WorkError
 from truearm.reporting.axes import curve_axis, places, readings_at
 from truearm.reporting.facts import OUTER, Facts
 from truearm.reporting.parameters import effect_mm
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 STEPS: Final = 121
 BAND_STEPS: Final = 31

@@ -13,9 +13,9 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.known import STRETCHES, Known, configurations, means_along, std_mm
 from truearm.reporting.numbers import fixed, percent, short
 from truearm.reporting.parts import Figure, Part, Section, Text
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CELLS: Final = (6, 12)

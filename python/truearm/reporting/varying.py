@@ -4,9 +4,6 @@ import json
 from collections.abc import Sequence
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truearm.fits.models import CONSTANT, VARIABLE
 from truearm.reporting.axes import coupling_words
 from truearm.reporting.curves import along, influence
@@ -18,9 +15,9 @@ from truearm.reporting.region_tree import region_tree
 from truearm.reporting.slices import slices
 from truearm.reporting.sweeps import influence_mm, swept_names
 from truearm.storage.summary import WAVE, waves_in_words
+from truearm.types import Floats
 
 Block = dict[str, Any]
-Floats = NDArray[np.float64]
 
 ROUNDING_MM: Final = 1e-9
 """An effect that is smaller is none but rounding."""

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import WorkError
 from truearm.reporting.facts import Facts
@@ -11,8 +10,6 @@ from truearm.reporting.numbers import signed
 from truearm.reporting.parameters import POSES, effect_mm, per_unit, unit_of
 from truearm.reporting.parts import Table
 from truearm.reporting.sweeps import corrections
-
-Floats = NDArray[np.float64]
 
 TOGETHER: Final = 3
 """Rows of a Jacobian that a covariance is asked for at once."""

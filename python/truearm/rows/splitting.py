@@ -15,9 +15,7 @@ from truearm.errors import InputError, Notice, UsageError, count_of, did_you_mea
 from truearm.measurements import Measurements
 from truearm.rows.visits import pose_numbers, visit_numbers
 from truearm.tables.columns import VALIDATE
-
-Rows = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from truearm.types import Mask, Rows
 
 NAMED: Final = 5
 FEW_KNOWN: Final = 0.05

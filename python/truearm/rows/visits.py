@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from truearm._core import same_poses
 from truearm.measurements import Measurements
 from truearm.rows.used_distances import holds_distances
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import Floats, Rows
 
 
 def pose_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:

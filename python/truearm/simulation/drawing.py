@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.errors import InputError, did_you_mean
@@ -17,9 +16,8 @@ from truearm.rotations import (
     transform_from_parts,
 )
 from truearm.simulation.imperfections import Imperfections
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 LENGTHS: Final = ("d", "a")
 

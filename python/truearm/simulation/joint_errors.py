@@ -3,14 +3,14 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import Chain
 from truearm.errors import InputError
 from truearm.robot import Robot
 from truearm.simulation.imperfections import Deflection, JointError
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 ChainTo = Callable[[int, Floats], Chain]
 
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm._core import Chain
 from truearm.arrays import as_rows
@@ -29,9 +29,8 @@ from truearm.simulation.drawing import (
 )
 from truearm.simulation.imperfections import Conditions, Imperfections, approach_in_sequence
 from truearm.simulation.joint_errors import check_joints, joint_errors, sagging
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 # The fifteen parameters of the RV-M2 that positions determine, section 6 of the paper; row 0 is BASE.
 # fmt: off

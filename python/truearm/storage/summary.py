@@ -5,20 +5,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M
 from truearm.errors import in_words
 from truearm.fits.details import left_m
 from truearm.judgement.validation import mean_distance
+from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
-Floats = NDArray[np.float64]
 
-AXES: Final = 3
 WAVE: Final = "wave"
 OWN: Final = "own"
 FEWEST_RIPPLES: Final = 3.0

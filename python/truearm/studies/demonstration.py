@@ -6,7 +6,6 @@ from typing import Final
 import numpy as np
 import pandas as pd
 import tomli_w
-from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.cell.cell_file import Cell
@@ -17,9 +16,8 @@ from truearm.files import parsed
 from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.rotations import rigid_inverse
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-
-Floats = NDArray[np.float64]
 
 EXAMPLE: Final = "rv-m2"
 PATH_POINTS: Final = 60

@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import Problem, Regions, Setup
 from truearm.defaults import PAPER_POSES
@@ -32,9 +31,8 @@ from truearm.studies.setting import (
     paper_arm,
     space_of,
 )
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 WORKSPACE_SEED: Final = 7
 

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M, Chain
 from truearm.fits.parameters import KIND_COUNT, A, D
 from truearm.studies.experiment import Experiment
 from truearm.studies.schemes import Scheme
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from truearm.files import write_whole
 from truearm.fits.parameters import ALPHA, THETA, A, D
 from truearm.studies.paper import Drawn
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
 TITLES: Final[Mapping[str, str]] = {
@@ -37,7 +37,6 @@ ROWS: Final[Mapping[str, Sequence[str]]] = {
 FIRST_LINK: Final = 1
 LENGTHS: Final = ((D, r"$\Delta d_1$", "#0072B2", "-"), (A, r"$\Delta a_1$", "#D55E00", "--"))
 ANGLES: Final = ((THETA, r"$\Delta\theta_1$", "#009E73", "-."), (ALPHA, r"$\Delta\alpha_1$", "#CC79A7", ":"))
-Floats = NDArray[np.float64]
 
 LEAST_SPAN: Final = {"mm": 0.1, "deg": 0.02}
 WIDTH_IN, ROW_IN = 7.0, 1.75

@@ -38,9 +38,9 @@ from truearm.studies.setting import (
     path_of,
     straight,
 )
+from truearm.types import Floats
 from truearm.workers import check_workers, run_tasks
 
-Floats = NDArray[np.float64]
 Result = dict[str, Any]
 
 RANDOM_PATHS: Final = 10

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from truearm._core import Network, Regions, Training, fill_without_data, linearise, regional_ceps
 from truearm.fits.core_set import Selection
@@ -16,12 +15,12 @@ from truearm.fits.options import CalibrationOptions
 from truearm.fits.schemes import add_ceps, training_pairs
 from truearm.measurements import Measurements
 from truearm.studies.experiment import Experiment
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm._core import NetworkFitOptions, NetworkOptions, RegionalOptions, TrainingRule
 
-Floats = NDArray[np.float64]
 Parameters = Callable[[Floats], Floats]
 
 CONSTANT_STEPS: Final = 3

@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.planning.spaces import JointSpace, Space, SphericalSpace
 from truearm.robot import Robot
 from truearm.simulation import Imperfections, VirtualArm
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 ROBOT: Final = "rv-m2"
 SHOULDER_M: Final = (0.0, -0.08, 0.4)

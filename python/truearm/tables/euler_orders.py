@@ -5,15 +5,14 @@ from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.rotations import euler_from_rotation, quaternion_from_euler, quaternion_from_rotation_vector
+from truearm.types import Floats
 from truearm.units import FULL_TURN
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Floats = NDArray[np.float64]
 
 USUAL: Final = ("XYZ", "ZYX", "ZYZ", "ZXZ")
 ORDERS: Final = tuple("".join(axes) for axes in product("XYZ", repeat=3) if axes[0] != axes[1] != axes[2])

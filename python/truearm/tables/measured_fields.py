@@ -4,7 +4,6 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from truearm.errors import InputError, Notice, list_names, list_rows
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
@@ -20,12 +19,10 @@ from truearm.tables.columns import (
     read_joint_layout,
     read_layout,
 )
-from truearm.tables.reading import Table, Texts
+from truearm.tables.reading import Table
 from truearm.tables.same_tables import own_anchor
+from truearm.types import Floats, Mask, Texts
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LARGEST_SIGMA_M: Final = 10.0
 """No instrument is less sure of a point that it has seen."""

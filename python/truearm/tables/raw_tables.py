@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, did_you_mean
 from truearm.files import decode_text, read_bytes, utf_16_of
@@ -16,7 +15,6 @@ from truearm.tables.missing_cells import without_missing
 from truearm.tables.reading import (
     DELIMITERS,
     Table,
-    Texts,
     WaysOut,
     check_is_table,
     comment_of,
@@ -27,10 +25,8 @@ from truearm.tables.reading import (
 )
 from truearm.tables.unit_row import without_unit_row
 from truearm.tables.workbooks import DELIMITER, is_workbook, sheet_text
+from truearm.types import Floats, Integers, Texts
 from truearm.units import unit_in_header
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 DECIMAL_MARKS: Final = (".", ",")
 UTF_8: Final = ("utf-8", "utf8", "utf-8-sig")

@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
 from truearm.files import LOOKED_AT, ZIP, decode_text, name_in_text, read_bytes, utf_16_of
+from truearm.types import Floats, Integers, Texts
 from truearm.units import HEADER_UNITS, bare_unit
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Texts = NDArray[np.str_]
 Column = NDArray[np.object_] | Floats
 """Texts as objects, as in an array of texts each takes what the longest takes; or numbers."""
 

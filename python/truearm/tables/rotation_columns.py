@@ -14,9 +14,8 @@ from truearm.rotations import (
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
 )
+from truearm.types import Floats
 from truearm.units import ANGLE_UNITS, FULL_TURN, to_si
-
-Floats = NDArray[np.float64]
 
 FORMS: Final = (
     "euler:XYZ:deg=RX,RY,RZ (capitals: moving axes; small letters: fixed axes)",

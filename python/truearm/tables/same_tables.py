@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.types import Texts
+
 if TYPE_CHECKING:
     from truearm.measurements import Measurements
 
-Texts = NDArray[np.str_]
 
 NAMES: Final = ("group0", "anchor0", "pair0")
 """Columns of names, which tables are given other ones of when they are put together."""

@@ -11,6 +11,7 @@ from truearm.doubts.nominal_misfit import some_rows
 from truearm.errors import Notice
 from truearm.fits.core_set import measured_points
 from truearm.judgement.judging import model_inputs
+from truearm.types import AXES
 from truearm.units import MM_PER_METRE
 from truearm.update_words import kept_words
 from truearm.updating.parts import part_of
@@ -19,7 +20,6 @@ from truearm.updating.scene import without
 LESS_CERTAIN: Final = "less_certain"
 CLEARLY: Final = 1.1
 """Times the standard deviation of before: no nearer is it known itself, from some dozens of poses."""
-AXES: Final = 3
 MOST_VALUES: Final = 300
 """They tell a mean over the poses as well as all."""
 

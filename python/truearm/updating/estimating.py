@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from truearm.errors import WorkError
+from truearm.types import Floats, Mask
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Linear, Scene, State
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MOST_STEPS: Final = 30
 STANDS_STILL: Final = 1e-6

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm._core import Setup
@@ -18,12 +17,10 @@ from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
 from truearm.revision import Carried
+from truearm.types import AXES, Floats
 from truearm.updating.parts import places_of
 from truearm.updating.scale import sigmas_m
 from truearm.updating.scene import Scene
-
-Floats = NDArray[np.float64]
-AXES = 3
 
 
 @dataclass(frozen=True, eq=False)

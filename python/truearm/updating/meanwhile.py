@@ -9,10 +9,9 @@ from truearm.doubts.at_once import BESIDE, Left
 from truearm.doubts.slips import Derivatives, Session, Slip, slips_of
 from truearm.drifting import Drift
 from truearm.fits.enough_values import FRAME_UNKNOWNS
+from truearm.types import Floats
 from truearm.updating.estimating import Estimate, unexplained
 from truearm.updating.scene import Scene
-
-Floats = NDArray[np.float64]
 
 
 def meanwhile(scene: Scene, found: Estimate) -> list[Slip]:

@@ -5,17 +5,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating.estimating import Estimate, posterior
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
 from truearm.updating.squares import SquaresTest, student_p, wald
 from truearm.updating.unknowns import Unknowns
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLD: Final = 0.5
 """An offset is told when its standard error is below this share of the prior's deviation."""

@@ -8,9 +8,8 @@ from truearm.errors import Notice, WorkError, count_of
 from truearm.fits.known_scale import KnownScale
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
-
-Floats = NDArray[np.float64]
 
 
 def known_scale(calibration: Calibration) -> KnownScale:

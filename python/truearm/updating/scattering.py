@@ -3,13 +3,11 @@
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotri
 
 from truearm.errors import WorkError
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 class Scatter:

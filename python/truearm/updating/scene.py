@@ -18,12 +18,10 @@ from truearm.fits.fitting import Task, core_errors, fit_options
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
+from truearm.types import Floats, Mask
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import known_scale, sigmas_m
 from truearm.updating.unknowns import Unknowns, is_part_of
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 RANK: Final = 1e-9
 """Columns reach no farther than this share of the farthest in directions that they do not have."""

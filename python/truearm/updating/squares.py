@@ -4,14 +4,11 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr
 
+from truearm.types import Floats, Mask
 from truearm.updating.estimating import Estimate
 from truearm.updating.unknowns import Unknowns
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TOLD: Final = 1.0
 """A direction is tested when the rows tell more of it than the prior."""

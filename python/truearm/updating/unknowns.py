@@ -15,11 +15,9 @@ from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.parameters import KIND_COUNT, KINDS, THETA, D, are_lengths
 from truearm.measurements import Measurements
+from truearm.types import Floats, Mask
 from truearm.units import to_si
 from truearm.updating.options import UpdateOptions
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 OPEN: Final = 1.0
 """What is found anew is known to a metre and a radian, as in the fits."""

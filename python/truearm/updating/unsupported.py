@@ -4,14 +4,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.fits.fitted_rows import overwhelming
+from truearm.types import Floats, Integers, Mask
 from truearm.updating.estimating import Estimate, unexplained
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 LINEAR: Final = 1e-3
 """Steps of the unknowns, m and rad, over which residuals are linear to about a micrometre."""
@@ -56,7 +52,7 @@ class _Left:
     residual: Floats
     metric: Floats
     gain: Floats
-    pose: Whole
+    pose: Integers
     bound: Floats
     moved: Floats
 
@@ -96,7 +92,7 @@ class _Left:
         )
 
 
-def surprise(metric: Floats, residual: Floats, pose: Whole) -> tuple[Whole, Floats]:
+def surprise(metric: Floats, residual: Floats, pose: Integers) -> tuple[Integers, Floats]:
     """How unlikely each pose is given all others.
 
     Args:

@@ -6,7 +6,6 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
@@ -20,13 +19,12 @@ from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.judging import judge
 from truearm.judgement.validation import RowErrors, Validation
 from truearm.revision import Carried, Revision
+from truearm.types import Floats
 from truearm.updating.carrying import carried
 from truearm.updating.estimating import Estimate
 from truearm.updating.kept_parts import KeptParts
 from truearm.updating.scene import Scene
 from truearm.updating.validating import setup_of
-
-Floats = NDArray[np.float64]
 
 
 def updated(

@@ -15,8 +15,6 @@ from truearm.measurements import Measurements
 from truearm.updating.estimating import Estimate, folds, left_out
 from truearm.updating.scene import Scene
 
-Floats = NDArray[np.float64]
-
 TURN: Final = 3
 
 

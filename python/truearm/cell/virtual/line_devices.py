@@ -4,7 +4,6 @@ import re
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import SimulateSection
 from truearm.cell.line_robot import LineRobot
@@ -13,9 +12,8 @@ from truearm.cell.patterns import expression_for, filled, numbers_in
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import ROOM_C, World
 from truearm.errors import InputError
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 SPEED_RAD_S: Final = 1.0
 PERIOD_S: Final = 0.01

@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 
 from truearm.cell import movemaster
-from truearm.cell.movemaster import Floats
 from truearm.cell.rv_m2 import RvM2
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import World
+from truearm.types import Floats
 from truearm.units import RADIANS_PER_DEGREE
 
 SETTLING_S: Final = 0.1

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.virtual.exclusive import exclusive
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 SIZE: Final = 72
 MOST_JOINTS: Final = 8

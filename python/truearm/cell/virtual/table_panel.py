@@ -4,15 +4,14 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.framing import framed, unframed
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import ROOM_C, World
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
 
-Floats = NDArray[np.float64]
 Answers = list[tuple[float, str]]
 
 SETTLING_S: Final = 0.05

@@ -4,7 +4,6 @@ import re
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell import ur_packets
 from truearm.cell.virtual.faults import Faults
@@ -13,8 +12,7 @@ from truearm.cell.virtual.wires import Wire
 from truearm.cell.virtual.world import World
 from truearm.inverse import Inverse
 from truearm.rotations import quaternion_from_rotation_vector, rigid_inverse, transform_from_parts
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 NUMBER: Final = r"[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?"
 MOVEJ: Final = re.compile(rf"movej\((p?)\[({NUMBER}(?:,{NUMBER}){{5}})\], a=({NUMBER}), v=({NUMBER})\)")

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
@@ -14,9 +13,8 @@ from truearm.cell.table_panel import TablePanel
 from truearm.cell.virtual.state import ARM, COLLISIONS, CONTACTS, STOPPED, TABLE, Mover, Shared
 from truearm.rotations import quaternion_from_rotation_vector, transform_from_parts
 from truearm.simulation import Conditions, VirtualArm
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 ROOM_C: Final = 21.0
 MOMENTS: Final = 12

@@ -13,8 +13,8 @@ from truearm.fits.models import ArmModel
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.studies.accuracy.poses import Poses, Prepared
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Settings = Mapping[str, Any]
 
 

@@ -18,8 +18,7 @@ from truearm.measurements import Measurements
 from truearm.studies.accuracy.cells import Cell
 from truearm.studies.accuracy.sets import read_set
 from truearm.studies.accuracy.splits import rows_of
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 THREADS = 1
 """A method's time is that of one thread."""

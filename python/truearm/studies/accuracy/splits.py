@@ -20,8 +20,8 @@ from truearm.fits.stillness import still_joints
 from truearm.measurements import Measurements
 from truearm.rows.splitting import HoldoutRange, Split, SplitRule, split_columns, split_rows
 from truearm.studies.accuracy.sets import DataSet, Read, read_set
+from truearm.types import Rows
 
-Rows = NDArray[np.int64]
 Kind = Literal["tails", "clusters", "groups", "target", "random"]
 
 KINDS: Final[tuple[Kind, ...]] = ("tails", "clusters", "groups", "target", "random")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.cell.accepted import accepted_table
 from truearm.cell.cell_file import Cell
@@ -37,9 +36,9 @@ from truearm.studies.process.setting import (
 )
 from truearm.studies.schemes import Kept, Scheme, all_schemes
 from truearm.studies.setting import WORKSPACE_POSES
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
-Floats = NDArray[np.float64]
 Result = dict[str, Any]
 
 RANDOM_PATHS: Final = 10

@@ -3,16 +3,14 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.planning.spaces import CartesianSpace
 from truearm.studies.experiment import Experiment
 from truearm.studies.metrics import Trace, scheme_chain
 from truearm.studies.process.setting import COMMAND_MM
 from truearm.studies.schemes import Scheme
+from truearm.types import Floats
 from truearm.units import MM_PER_METRE, to_si
-
-Floats = NDArray[np.float64]
 
 STEPS: Final = 12
 SETTLED_M: Final = 1e-9

@@ -19,9 +19,8 @@ from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.process.setting import DEMANDED_MM, Setting, cell_text, space
 from truearm.studies.setting import CANDIDATES, FREE_TO_STOP
 from truearm.tables.columns import VALIDATE
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 PLANNED: Final = 0
 """Seed of the draw of poses: the same for all arms."""

@@ -5,7 +5,6 @@ from typing import Any, Final
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
 from truearm.cell.examples import example
 from truearm.defaults import EXPERIMENT_SPEED, PAPER_POSES, PAPER_REGIONS
@@ -16,9 +15,8 @@ from truearm.planning.spaces import CartesianSpace
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.setting import ROBOT, TEST_POINTS, straight
+from truearm.types import Floats
 from truearm.units import to_si
-
-Floats = NDArray[np.float64]
 
 DEMANDED_MM: Final = 0.5
 SECONDS_A_MEASUREMENT: Final = 5.0

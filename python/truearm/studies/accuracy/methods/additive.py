@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.gaussian_process.kernels import Hyperparameter, Kernel, StationaryKernelMixin
 
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 
 class SumOverJoints(StationaryKernelMixin, Kernel):  # type: ignore[misc]

@@ -6,16 +6,14 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.linear import Ridge, fit_linear
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats
 from truearm.units import FULL_TURN
-
-Floats = NDArray[np.float64]
 
 DEGREE: Final = 3
 CELLS: Final = (24, 48, 96, 144)

@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.libraries import quiet
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.methods.spaces import Kind, Space
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Inputs = Callable[[Poses], Floats]
 
 FIRST_LOOK: Final = 150

@@ -3,14 +3,12 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.linear import Ridge, fit_linear
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.poses import Poses
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 COMPLIANCES: Final = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
 """Standard deviations of compliance times weight, rad per metre of lever."""

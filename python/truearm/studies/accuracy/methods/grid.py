@@ -6,7 +6,6 @@ from itertools import product
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import NdBSpline
 from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import spsolve
@@ -15,14 +14,11 @@ from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.searching import Effort, best_setting
 from truearm.studies.accuracy.methods.spaces import Kind, Space
 from truearm.studies.accuracy.poses import Poses
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import AXES, Floats, Rows
 
 SPACES: Final[tuple[Kind, ...]] = ("cartesian", "joints")
 NODES: Final = (3, 5, 8)
 RIDGES: Final = (0.03, 0.3, 3.0)
-AXES: Final = 3
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,14 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from truearm.fits.parameters import are_lengths
 from truearm.studies.accuracy.methods.searching import Effort, folds, search_rows
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Columns = Callable[[Poses], Floats]
 
 CONSTANT_M: Final = 2e-3

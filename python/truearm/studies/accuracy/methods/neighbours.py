@@ -4,15 +4,13 @@ from itertools import product
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.regressor import fit_regressor
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.methods.spaces import Kind
 from truearm.studies.accuracy.poses import Poses
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 SPACES: Final[tuple[Kind, ...]] = ("joints", "circles", "cartesian")
 COUNTS: Final = (3, 5, 8, 12, 20)

@@ -6,16 +6,13 @@ from itertools import product
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RBFInterpolator
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.searching import Effort, best_setting
 from truearm.studies.accuracy.methods.spaces import Kind, Space
 from truearm.studies.accuracy.poses import Poses
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from truearm.types import Floats, Rows
 
 SPACES: Final[tuple[Kind, ...]] = ("joints", "circles", "cartesian")
 Shape = Literal["linear", "gaussian"]

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.libraries import quiet
 from truearm.studies.accuracy.methods.searching import Effort, best_setting
 from truearm.studies.accuracy.methods.spaces import Kind, Space
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats, Rows
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Make = Callable[[dict[str, Any], int], Any]
 Setting = tuple[Kind, dict[str, Any]]
 

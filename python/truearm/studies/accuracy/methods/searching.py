@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.rows.visits import pose_numbers
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats, Rows
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Setting = TypeVar("Setting")
 Setting_contra = TypeVar("Setting_contra", contravariant=True)
 

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.poses import Poses
+from truearm.types import Floats
 
-Floats = NDArray[np.float64]
 Kind = Literal["joints", "circles", "cartesian"]
 
 

@@ -4,14 +4,12 @@ from itertools import product
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.methods.regressor import Setting, fit_regressor
 from truearm.studies.accuracy.methods.searching import Effort
 from truearm.studies.accuracy.poses import Poses
-
-Floats = NDArray[np.float64]
+from truearm.types import Floats
 
 LEAVES: Final = (4, 8, 16)
 ROUNDS: Final = (100, 400)
