@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -23,6 +24,7 @@ from truearm.controller import Controller
 from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting import FORMATS, ExportOptions, constant_robot, export
+from truearm.exporting.losses import beta_is_lost
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.exporting.urdf_file import comment
 from truearm.simulation import VirtualArm
@@ -359,6 +361,13 @@ def test_beta_is_said_where_there_is_some(ur10):
     notes = " ".join(export(ur10, "dh-csv").notes)
     assert "Links 2 and 3 of the table have beta" in notes
     assert "beta" not in " ".join(export(ur10, "urdf").notes)
+
+
+def test_a_beta_that_moves_nothing_is_not_said(ur10):
+    table = np.array(ur10.robot.table)
+    for beta, said in ((1e-11, False), (1e-7, True)):
+        table[:, 4] = [0.0, beta, 0.0, 0.0, 0.0, 0.0]
+        assert bool(beta_is_lost(replace(ur10.robot, table=table))) == said
 
 
 def test_a_lost_field_is_said_with_what_it_costs(variable, ur10):

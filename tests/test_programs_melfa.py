@@ -139,6 +139,14 @@ def test_motions_that_are_not_certain_are_listed(robot, statement):
     assert not result.changed.any()
 
 
+def test_a_number_that_is_too_large_is_none(robot):
+    place = position(robot, Q[0])
+    text = f"1 Tool (0,0,0,0,0,0)\n2 Mvs P1\n3 Mvs P2\nP1=(1E400,{place.partition(',')[2]}\nP2={place}\n"
+    result = rewritten(MELFA, text, robot, by=SHIFT)
+    assert names_changed(result) == ["P2"]
+    assert [name for _, name, _ in reasons(result)] == ["P1"]
+
+
 @pytest.mark.parametrize("branch", ["If M1=1 Then Tool (0,0,200,0,0,0)", "If M1=1 Then M_Tool=2"])
 def test_a_tool_that_a_branch_of_a_line_may_set_is_not_known_behind_it(robot, branch):
     places = f"P1={position(robot, Q[0], 0.1)}\nP2={position(robot, Q[1], 0.1)}\n"

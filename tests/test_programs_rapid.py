@@ -92,6 +92,12 @@ def test_declared_and_written_out_targets():
     assert np.abs(said - done.corrected)[done.changed].max() < 3e-5
 
 
+def test_a_number_that_is_too_large_is_told_with_its_line():
+    text = f"MoveAbsJ [[1e400,10,20,0,30,0],{UNUSED}],v1000,z50,tG;"
+    with pytest.raises(InputError, match=r"demo\.mod, line \d+, column \d+: 1e400 is too large for a number"):
+        read("demo.mod", module(text), ABB)
+
+
 def test_only_numbers_change():
     program = read("demo.mod", module(BODY, points()), ABB)
     done = rewritten(program, models(ABB))

@@ -11,7 +11,7 @@ from truearm.description.robot_data import RobotData
 from truearm.doubts.outliers import Outliers
 from truearm.errors import list_rows
 from truearm.fits.models import CONSTANT
-from truearm.fits.parameters import BETA
+from truearm.fits.parameters import BETA, A, D
 
 ONLY_ROS: Final = (
     "This changes the model that ROS computes with, and with it plans, transforms and visualisation. It does "
@@ -26,6 +26,8 @@ FORMAT_WORDS: Final = {
     "dh-csv": "a D-H table",
 }
 
+FELT_M: Final = 1e-9
+"""A beta that moves the tool by less at the arm's full reach is rounding, and nothing is lost with it."""
 LINK_ORDER: Final = {
     "standard": "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
     "modified": "Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d)",
@@ -63,7 +65,8 @@ def _without_outliers(calibration: Calibration) -> str:
 
 def beta_is_lost(robot: RobotData) -> list[str]:
     """That software with four parameters a link leaves Hayati's beta out."""
-    rows = np.flatnonzero(robot.table[:, BETA]) + 1
+    reach_m = np.abs(robot.table[:, [A, D]]).sum()
+    rows = np.flatnonzero(np.abs(robot.table[:, BETA]) * reach_m > FELT_M) + 1
     if not len(rows):
         return []
     verb = "has" if len(rows) == 1 else "have"

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from math import isfinite
 from re import Pattern
 from typing import Final, NamedTuple, NoReturn
 
@@ -101,7 +102,11 @@ class Reader:
         return self._tokens[self._at :]
 
     def signed_number(self) -> Number | None:
-        """A number with its sign, if one is next; it is taken then."""
+        """A number with its sign, if one is next; it is taken then.
+
+        Raises:
+            InputError: If no number is that large.
+        """
         sign = 1 if self.peek() in {"-", "+"} else 0
         if self.kind(sign) != "number":
             return None
@@ -109,6 +114,8 @@ class Reader:
         last = self._tokens[self._at + sign]
         self._at += sign + 1
         value = float(last.text) * (-1.0 if first.text == "-" else 1.0)
+        if not isfinite(value):
+            self.source.fail(last.start, f"{last.text} is too large for a number")
         return Number(first.start, last.end, value, decimals_of(last.text))
 
     def fail(self, what: str) -> NoReturn:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from math import isfinite
 from typing import Final, NamedTuple
 
 from truearm.programs.source import Source
@@ -228,7 +229,7 @@ def _numbers(text: str, at: int, span: tuple[int, int]) -> list[Number] | None:
     numbers, start = [], span[0]
     for piece in text[span[0] : span[1]].split(","):
         found = _ELEMENT.match(piece)
-        if found is None:
+        if found is None or not isfinite(float(found.group(1) or 0.0)):
             return None
         if found.group(1) is None:
             numbers.append(ABSENT)
