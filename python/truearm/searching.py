@@ -122,7 +122,7 @@ class Search:
                 del refused[place]
 
     def _from_both_sides(self, pose: Floats, seed: Floats, inverse: Inverse) -> Floats:
-        """Readings (k, N) for a pose (4, 4), the nearest first, of a seed (N,) that does not tell its side."""
+        """Readings (k, N) for a pose (4, 4), the nearest first, if the seed (N,) does not tell its side."""
         begun = beside(inverse, seed)
         readings, _ = self._once(np.tile(pose, (len(begun), 1, 1)), begun)
         readings = readings[np.isfinite(readings).all(axis=1)]
