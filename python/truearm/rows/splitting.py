@@ -69,7 +69,7 @@ class HoldoutRange:
         return f"q{self.joint}:{'high' if self.high else 'low'}:{self.share!r}"
 
 
-def _tail(given: object, name: str) -> HoldoutRange | None:
+def _as_range(given: object, name: str) -> HoldoutRange | None:
     if given is None:
         return None
     return kinds.required(HoldoutRange.parse(given) if isinstance(given, str) else given, HoldoutRange, name)
@@ -110,7 +110,7 @@ class SplitRule:
     seed: int = SEED
     train_size: int | None = None
     split_by: kinds.Names = kinds.Names(kinds.words, ())
-    holdout_range: kinds.Kept[str | HoldoutRange | None, HoldoutRange | None] = kinds.Kept(_tail, None)
+    holdout_range: kinds.Kept[str | HoldoutRange | None, HoldoutRange | None] = kinds.Kept(_as_range, None)
     by_purpose: bool = True
 
     def __post_init__(self) -> None:
