@@ -13,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from truearm.kinds import Kept
+
 PAGE = Path(__file__).parent / "reference" / "python-docstrings.md"
 HEAD = """# Python, from its docstrings
 
@@ -90,7 +92,7 @@ def _members(kind: type) -> Iterator[tuple[str, str, Any]]:
         if inspect.isfunction(function):
             before = kind.__name__ if function is not member else kind.__name__.lower()
             yield name, _call(f"{before}.{name}", function), function
-        elif hasattr(member, "__get__"):
+        elif hasattr(member, "__get__") and not isinstance(member, Kept):
             yield name, "", member
 
 

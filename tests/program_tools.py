@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from truearm.controller import Controller
-from truearm.errors import InputError
+from truearm.errors import TruearmError
 from truearm.programs.frames import Frames
 from truearm.programs.rewriting import Choices, Models, rewrite
 from truearm.programs.source import Source
@@ -88,6 +88,6 @@ def survives(language, text, robot, frames="", **options):
     """Whether a text ends in a program or in an error with a place, and nothing else."""
     try:
         rewritten(language, text, robot, frames=frames, **options)
-    except InputError as error:
+    except TruearmError as error:
         return bool(error.where)
     return True

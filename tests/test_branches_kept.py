@@ -158,6 +158,23 @@ def test_an_arm_without_named_branches_goes_to_either_side_too():
     np.testing.assert_allclose(real.pose(found), real.pose(readings), atol=1e-6)
 
 
+def test_from_a_stretched_elbow_poses_are_found_that_the_nominal_arm_does_not_reach():
+    robot = ta.Robot.load("ur10")
+    table, rng = robot.table.copy(), np.random.default_rng(5)
+    table[1:3, 2] *= 1.0 + 1e-3
+    table[2, 0] += 1e-3
+    real = dataclasses.replace(robot, table=table)
+    readings = np.array([0.3, -1.2, 0.0, -0.5, 0.9, 0.2]) + rng.uniform(-0.05, 0.05, (20, 6))
+    readings[:, 2] = rng.choice([-1.0, 1.0], 20) * rng.uniform(0.02, 0.08, 20)
+    poses, seeds = real.pose(readings), readings * (np.arange(6) != 2)
+    assert not np.isfinite(Inverse(robot).branches(poses @ np.linalg.inv(robot.tool))).any()
+    solver = Solver(plain_model(real), robot.tool, core_options(robot, "pose", None, Limits()))
+    search = Search(robot, solver, "pose", robot.tool, [])
+    paths = [search.near(poses[k : k + 1], seeds[k])[0] for k in range(20)]
+    for found in (search.near(poses, seeds)[0], np.concatenate(paths)):
+        np.testing.assert_allclose(real.pose(found), poses, atol=1e-8)
+
+
 def test_readings_beside_their_seeds_are_found_beside_singularities_too(calibration):
     rng = np.random.default_rng(3)
     readings = rng.uniform(-2.0, 2.0, (200, 6))

@@ -197,7 +197,7 @@ def test_the_world_as_frame_is_kept():
 )
 def test_options_that_cannot_be(known, options, words):
     arm, calibration = known
-    with pytest.raises(ta.InputError, match=words):
+    with pytest.raises((ta.InputError, ta.UsageError), match=words):
         ta.evaluate(calibration, arm.measure(arm.poses(40)), **options)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
 
 TABLES = {
@@ -217,7 +217,7 @@ def test_at_most_ten_rows_are_named(tmp_path: Path) -> None:
 def test_options_that_contradict_the_file(tmp_path: Path, header: str, options: Any, message: str) -> None:
     path = tmp_path / "data.csv"
     path.write_text(f"{header}\n0,1,2,3\n")
-    with pytest.raises(InputError, match=message):
+    with pytest.raises((InputError, UsageError), match=message):
         Measurements.read_csv(path, **options)
 
 

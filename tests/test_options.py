@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from truearm.cell.plan import PlanOptions
 from truearm.fits import core_set
 from truearm.fits.scheme_options import SchemeOptions
 from truearm.programs.densify import Spacing
+from truearm.rows.splitting import HoldoutRange
 from truearm.simulation import VirtualArm
 
 api: Any = ta
@@ -84,6 +86,10 @@ WRONG = {
         lambda: api.CalibrationOptions(robust="hubre"),
         'robust: "hubre" .* Did you mean "huber"',
     ),
+    "joint limits in words": (
+        lambda: api.Limits(joint_limits="no"),
+        "joint_limits is 'no'. It must be True or False",
+    ),
     "half a region": (lambda: RULES["scheme"](most_regions=1.5), "most_regions is 1.5"),
     "joints in words": (lambda: RULES["scheme"](scheme_joints="12"), "scheme_joints is '12'"),
     "half a joint": (lambda: RULES["scheme"](scheme_joints=(1.5,)), "a number of scheme_joints is 1.5"),
@@ -112,6 +118,12 @@ def test_options_that_cannot_be_are_refused_when_they_are_made(case):
 def test_threads_that_cannot_be_are_refused(threads, arm, data):
     with pytest.raises(ta.UsageError, match="threads"):
         ta.calibrate(arm.robot, data, threads=threads)
+
+
+def test_stages_may_be_told_to_nobody(arm, data):
+    calibration = ta.calibrate(arm.robot, data, model="constant", stages=None)
+    assert ta.evaluate(calibration, data, stages=None).n_judged
+    assert ta.update(calibration, data.select(range(20)), stages=None).verdict
 
 
 def test_numbers_of_numpy_become_those_of_python():
@@ -150,9 +162,24 @@ def test_a_calibration_with_numbers_of_numpy_is_saved(arm, data, tmp_path):
 
 
 def test_names_are_one_text_or_several():
-    options = ta.CalibrationOptions(features="load, warmth")  # type: ignore[arg-type]
-    assert options == ta.CalibrationOptions(features=("load", "warmth"))
-    assert ta.SplitRule(split_by=["a", "b"]) == ta.SplitRule(split_by="a,b")  # type: ignore[arg-type]
+    options = ta.CalibrationOptions(features="load, warmth")
+    assert options == ta.CalibrationOptions(features=["load", "warmth"])
+    assert ta.SplitRule(split_by=["a", "b"]) == ta.SplitRule(split_by="a,b")
+
+
+def test_what_is_held_is_of_one_type_however_it_was_given():
+    """Type checkers see both: calls as the documentation shows them, and what is read of them."""
+    split = ta.SplitRule(holdout_range="q2:high:0.3")
+    held: HoldoutRange | None = split.holdout_range
+    assert held == HoldoutRange(2, high=True, share=0.3)
+    names: tuple[str, ...] = ta.CalibrationOptions(features=["t"]).features
+    joints: tuple[int, ...] = SchemeOptions(scheme_joints=[1, 2]).scheme_joints
+    assert (names, joints) == (("t",), (1, 2))
+    again = pickle.loads(pickle.dumps(replace(split, seed=3)))
+    assert again == ta.SplitRule(holdout_range=held, seed=3)
+    assert repr(ta.SplitRule()) == (
+        "SplitRule(holdout=0.3, seed=7, train_size=None, split_by=(), holdout_range=None, by_purpose=True)"
+    )
 
 
 def test_measurements_without_rows_are_refused(arm, data):

@@ -24,6 +24,12 @@ def test_outliers_are_listed_and_kept_in_the_held_out_errors():
     assert calibration.summary["outliers"][0]["distance_mm"] > 15.0
     assert calibration.validation.holdout["variable"].position.max > 15.0
     assert calibration.validation.holdout["variable"].position.mean < 1.0
+    rows = calibration.rows
+    assert rows is not None
+    ratio, is_outlier = rows.distance_m / np.linalg.norm(rows.residual[:, :3], axis=1), rows.score > 1.0
+    np.testing.assert_allclose(ratio[is_outlier], 1.0, rtol=0.02)
+    assert ratio.min() >= 1.0
+    assert np.median(ratio[~is_outlier]) > 1.1, "the others' are of the model without the row"
 
 
 def test_outliers_leave_nothing_behind_of_what_was_found_with_them():

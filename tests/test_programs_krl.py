@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.program_tools import Bend
 from tests.programs_rig import KUKA, again, models, obeyed, read, rewritten
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.programs.branches import Branches
 from truearm.programs.densify import Spacing
 from truearm.programs.krl_status import StatusAndTurn
@@ -266,7 +266,7 @@ def test_any_text_ends_in_a_program_or_an_error(lines, noise):
     text = "\r\n".join([*lines, noise.encode("latin-1", "replace").decode("latin-1"), *lines])
     try:
         program = read("a.src", text, KUKA, TOOL, dat=data())
-    except InputError as error:
+    except TruearmError as error:
         message = str(error)
     else:
         message = "line"

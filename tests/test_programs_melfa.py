@@ -17,7 +17,7 @@ from tests.program_tools import (
     skeleton,
     survives,
 )
-from truearm.errors import InputError
+from truearm.errors import WorkError
 from truearm.programs.branches import Branches
 from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
@@ -286,7 +286,7 @@ def test_the_mark_keeps_line_numbers(robot, sample):
     text = "compensated by truearm 1.2.3"
     marked = rewritten(MELFA, sample, robot, by=SHIFT, mark=text).contents[0].decode()
     assert marked.splitlines()[0] == f"1 ' Mov P1 is a remark ' {text}"
-    with pytest.raises(InputError, match="compensated already"):
+    with pytest.raises(WorkError, match="compensated already"):
         rewritten(MELFA, marked, robot)
     later = sample.replace("1 ' Mov P1 is a remark\n", "")
     marked = rewritten(MELFA, later, robot, by=SHIFT, mark=text).contents[0].decode()

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.programs_rig import ABB, again, models, obeyed, read, rewritten
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.programs.branches import Branches
 from truearm.programs.program import LinearStep
 from truearm.programs.rapid_configuration import Confdata
@@ -239,7 +239,7 @@ def test_any_text_ends_in_a_program_or_an_error(cut, noise):
     text = whole[:cut] + noise.encode("latin-1", "replace").decode("latin-1") + whole[cut + len(noise) :]
     try:
         program = read("demo.mod", text, ABB)
-    except InputError as error:
+    except TruearmError as error:
         message = str(error)
     else:
         message = "line, column"

@@ -19,7 +19,7 @@ from tests.program_tools import (
     survives,
 )
 from truearm.controller import Controller
-from truearm.errors import InputError
+from truearm.errors import InputError, WorkError
 from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
 from truearm.programs.solving import AMBIGUOUS
@@ -343,7 +343,7 @@ def test_the_mark_is_remarks_that_are_not_too_long(robot, sample):
     remarks = [line for line in marked.splitlines() if line.startswith("    :  !")]
     assert " ".join(line[8:-2] for line in remarks) == text
     assert max(len(line) - 10 for line in remarks) <= 32
-    with pytest.raises(InputError, match="compensated already"):
+    with pytest.raises(WorkError, match="compensated already"):
         rewritten(TP, marked, robot, frames=FRAMES)
 
 

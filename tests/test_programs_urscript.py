@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.program_tools import names_changed, read, reasons, rewritten, says, skeleton, survives
-from truearm.errors import InputError
+from truearm.errors import InputError, WorkError
 from truearm.programs.program import LinearStep
 from truearm.programs.tables import Motion
 from truearm.programs.urscript import UrScript
@@ -331,7 +331,7 @@ def test_the_mark_is_a_comment_before_everything(robot):
     text = "movej([0, -1.5, 1.5, -1.5, -1.5, 0])\r\n"
     marked = rewritten(UR, text, robot, by=SHIFT, mark="compensated by truearm 1").contents[0]
     assert marked.startswith(b"# compensated by truearm 1\r\nmovej([")
-    with pytest.raises(InputError, match="compensated already"):
+    with pytest.raises(WorkError, match="compensated already"):
         rewritten(UR, marked, robot)
 
 

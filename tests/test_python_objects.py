@@ -156,6 +156,10 @@ def test_models_are_copied_and_sent_with_their_calibration(calibration):
     assert copy.copy(calibration.model) is calibration.model
     with pytest.raises(ta.UsageError, match="Send the calibration, and take calibration.models from that"):
         pickle.dumps(calibration.models)
+    with pytest.raises(ta.UsageError, match="Send the calibration, and take calibration.spread from that"):
+        pickle.dumps(calibration.spread)
+    assert calibration.arm.flange_chain is not None
+    assert np.array_equal(sent(calibration.arm).table, calibration.arm.table)
 
 
 @pytest.mark.parametrize("kind", [ta.TruearmError, ta.InputError, MalformedError, ConformanceError])
@@ -164,6 +168,12 @@ def test_all_errors_say_what_is_wrong_in_parts(kind):
     assert (type(error), error.what, error.where) == (kind, "2 mm", "a.toml, limits")
     assert (error.rule, error.way_out) == ("It is less than 1", "Give less")
     assert str(error) == "a.toml, limits: 2 mm. It is less than 1. Give less."
+
+
+def test_no_kind_of_error_is_another_one():
+    kinds = [ta.InputError, ta.UsageError, ta.WorkError]
+    assert all(issubclass(kind, ta.TruearmError) for kind in kinds)
+    assert not [(a, b) for a in kinds for b in kinds if a is not b and issubclass(a, b)]
 
 
 @pytest.mark.parametrize("again", [sent, copy.copy, copy.deepcopy])
@@ -402,7 +412,7 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_arguments_are_told_what_is_needed(case, robot, data, calibration):
     call, words = WRONG[case]
-    with pytest.raises(ta.InputError, match=words):
+    with pytest.raises((ta.InputError, ta.UsageError), match=words):
         call(robot, data, calibration)
 
 

@@ -51,6 +51,12 @@ def reports(calibrations):
     return {model: report(calibration) for model, calibration in calibrations.items()}
 
 
+def test_tables_have_titles_for_people(reports):
+    titles = re.findall("<h3[^>]*>([^<]*)", reports["variable"].html)
+    assert "Options" in titles
+    assert not [title for title in titles if re.search(r"[a-z][A-Z]|_", title)]
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_the_table_is_that_of_the_summary(calibrations, reports, model):
     summary = calibrations[model].summary

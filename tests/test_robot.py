@@ -282,6 +282,12 @@ def test_what_is_no_table_of_an_arm_is_refused(given: dict[str, Any], message: s
         Robot.from_table("Mine", table, **given)
 
 
+@pytest.mark.parametrize("name", ["", "arm \udc80"])
+def test_a_name_that_no_file_can_hold_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match="The name is"):
+        replace(Robot.load("ur5"), name=name)
+
+
 def test_where_numbers_come_from_may_be_left_out_of_a_dictionary() -> None:
     content = Robot.load("ur5").to_dict()
     del content["source"]

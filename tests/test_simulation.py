@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS, Imperfections, VirtualArm
@@ -152,7 +152,7 @@ def _matrices(quaternions):
 @pytest.mark.parametrize("held", [[0], [7], [1.5], "1", 3])
 def test_joints_that_cannot_be_held_are_refused(held):
     arm = VirtualArm(Robot.load("ur10"), seed=1)
-    with pytest.raises(InputError, match="joint|held"):
+    with pytest.raises(UsageError, match="joint|held"):
         arm.poses(2, held=held)
 
 

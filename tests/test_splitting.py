@@ -330,4 +330,4 @@ def test_every_digit_of_a_range_is_kept():
     assert HoldoutRange.parse(str(tail)) == tail
     options = CalibrationOptions.of(holdout_range=tail)
     assert CalibrationOptions.of(**options.to_dict()) == options
-    assert SplitRule(holdout_range=str(tail)).holdout_range == tail  # type: ignore[arg-type]
+    assert SplitRule(holdout_range=str(tail)).holdout_range == tail

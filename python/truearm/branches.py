@@ -67,6 +67,20 @@ def starts(inverse: Inverse, base_from_flange: Floats, seeds: Floats, *, nearest
     return found
 
 
+def beside(inverse: Inverse, seed: Floats) -> Floats:
+    """Readings (k, N) on both sides of each singularity whose side the seed (N,) does not tell: so far off
+    that the calibrated arm is on both sides of its own, too.
+    """
+    untold = ~_told(inverse, seed[None])[0]
+    if not untold.any():
+        return np.empty((0, len(seed)))
+    steps = CORRECTION_RAD * np.eye(len(seed))[inverse.robot.revolute]
+    ways = np.stack([seed + steps, seed - steps])
+    sides = inverse.sides(ways.reshape(-1, len(seed))).reshape(*ways.shape[:2], -1)
+    across = (sides[0] != sides[1])[:, untold].any(axis=1)
+    return np.asarray(ways[:, across].reshape(-1, len(seed)))
+
+
 def _crossings(inverse: Inverse, q: Floats, before: Floats) -> Mask:
     """Which sides (n, S) differ between two readings that both tell them."""
     differ: Mask = inverse.sides(q) != inverse.sides(before)

@@ -66,7 +66,7 @@ def calibrate(
     options: CalibrationOptions | None = None,
     *,
     threads: int | None = None,
-    stages: Stages = no_stages,
+    stages: Stages | None = None,
     **more: Any,
 ) -> Calibration:
     """Calibrate an arm: fit to training rows, judge on held-out rows, then fit to all rows.
@@ -76,7 +76,8 @@ def calibrate(
         data: What was measured.
         options: How to calibrate; the command line's defaults without them.
         threads: Threads at the most; the result does not depend on it.
-        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        stages: Called with the name of each stage; gives a context manager that surrounds it; None
+            for nobody.
         **more: The same options as keywords, such as model="constant", train_size=400 or seed=1.
 
     Raises:
@@ -85,7 +86,7 @@ def calibrate(
         WorkError: If the rows determine too little.
     """
     chosen = kinds.chosen(CalibrationOptions, options, more, CalibrationOptions.of)
-    robot = kinds.required(robot, Robot, "the robot")
+    robot, stages = kinds.required(robot, Robot, "the robot"), stages or no_stages
     given, notices = admitted(Measurements.of(data), robot)
     notices += [*stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
     task = _task(robot, given, chosen, threads, stages)
@@ -320,7 +321,7 @@ def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetail
     return VariableDetails(
         hyper=final.variable.hyper,
         evidence=searched.variable.evidence,
-        evaluations=searched.variable.evaluations,
+        evaluations=searched.evaluations,
         inflation=final.variable.inflation,
         unexplained_m=unexplained(task, final.variable, final.data),
         feature_ranges=tuple(feature_ranges(values)),

@@ -339,9 +339,10 @@ class Calibration:
         """Bounds of the standard deviation of position and rotation, (n, 2), m and rad.
 
         The first is a bound of the root of the sum of the variances of x, y and z, the second of those of the
-        rotation vector. They are never below what `pose_std` says: the first is mostly one and a half to four
-        times as large for variable models, and up to half as large again for constants alone; the second is
-        a few percent above. They cost about a thousandth; compensation and controllers judge by them.
+        rotation vector. They are never below what `pose_std` says: the second is a few percent above, the
+        first mostly one and a half to four times as large for variable models. For constants it is up to 1.5
+        times for a tool within 0.2 m of the middle of what was measured, twice at 0.5 m, three times at 1 m.
+        They cost about a thousandth; controllers judge by them, and compensation where something varies.
 
         Raises:
             WorkError: If the file has neither bounds nor the rows to work them out from.

@@ -67,6 +67,8 @@ class Compensated:
         correction_mm: How far the correction shifts the tool, (n,), as the programming model sees it.
         correction_mrad: How far it turns it, (n,).
         std_mm: Standard deviation of the tool's position, (n,): root of the sum of the variances of x, y, z.
+            With constants alone it is exact; with a variable model its bound, `Calibration.conservative_std`,
+            and NaN where the file has none.
         refusals: The refused waypoints, ascending.
     """
 

@@ -20,7 +20,7 @@ from truearm.errors import Notice
 from truearm.fits.details import ANOTHER_PLACE, DriftDetails, Jump
 from truearm.fits.fitted_rows import without_drift
 from truearm.fits.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
-from truearm.fits.models import CONSTANT, VARIABLE
+from truearm.fits.models import VARIABLE
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
 from truearm.rows.visits import means, visit_numbers
@@ -115,33 +115,26 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
         train: The rows to fit to.
 
     Returns:
-        The fits, with the time of all that it took, and the drift at every row of `data`.
+        The fits, with the time and the evaluations of all that it took, and the drift at every row of `data`.
     """
     if task.options.drift == NO_DRIFT or task.options.model != VARIABLE:
         return fit_rows(task, data.select(train)), Drift.none(data)
     drift, some = Drift.none(data), train[some_of_each(data.group[train], ROUGHLY)]
-    known, spent = KnownHyper(rough=True), {CONSTANT: 0.0, VARIABLE: 0.0}
+    known, rough = KnownHyper(rough=True), None
     for look in range(MOST_LOOKS):
-        rough = fit_rows(task, drift.taken_out(data).select(some), known)
-        known, spent = KnownHyper(near=rough.variable, rough=True), _both(spent, rough.seconds)
+        rough = fit_rows(task, drift.taken_out(data).select(some), known).after(rough)
+        known = KnownHyper(near=rough.variable, rough=True)
         found = _drift_of(task, rough, drift, (data, some), most_steps=look + 1)
         if found is None:
             break
         drift = found
-    fits = fit_rows(task, drift.taken_out(data).select(train), replace(known, rough=False))
-    spent = _both(spent, fits.seconds)
+    fits = fit_rows(task, drift.taken_out(data).select(train), replace(known, rough=False)).after(rough)
     # Waves and gross rows, which only the finished fit is without, may have hidden one from the rough ones.
     found = None if drift else _drift_of(task, fits, drift, (data, train), most_steps=MOST_LOOKS)
     if found is not None:
         drift = found
-        fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable))
-        spent = _both(spent, fits.seconds)
-    return replace(fits, seconds=spent), drift
-
-
-def _both(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
-    """Seconds of two fits together."""
-    return {name: value + first[name] for name, value in second.items()}
+        fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable)).after(fits)
+    return fits, drift
 
 
 def _drift_of(

@@ -46,11 +46,11 @@ class InputError(TruearmError):
     """A file or a value that cannot be used."""
 
 
-class UsageError(InputError):
-    """Options or arguments that contradict each other or cannot be read."""
+class UsageError(TruearmError):
+    """Options or arguments that contradict each other, cannot be read or are of another type."""
 
 
-class WorkError(InputError):
+class WorkError(TruearmError):
     """The input is well formed, and still the work could not be done."""
 
 

@@ -30,7 +30,7 @@ from truearm.doubts.of_results import NO_HELP, no_help
 from truearm.doubts.outliers import known_mean_mm
 from truearm.doubts.slips import MOSTLY
 from truearm.doubts.turning_sense import check_turns
-from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
+from truearm.errors import InputError, Notice, TruearmError, UsageError, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
 from truearm.fits.fitted_rows import known_rows
 from truearm.fits.fitting import Task, fit_setup
@@ -146,7 +146,7 @@ def evaluate(
     data: Measurements | Sequence[Measurements],
     options: EvaluationOptions | None = None,
     *,
-    stages: Stages = no_stages,
+    stages: Stages | None = None,
     **more: Any,
 ) -> Evaluation:
     """Errors of a calibration's models on `data`.
@@ -157,7 +157,8 @@ def evaluate(
         calibration: What is judged.
         data: Measurements of the same arm.
         options: How to judge; defaults without them.
-        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        stages: Called with the name of each stage; gives a context manager that surrounds it; None
+            for nobody.
         **more: The same options as keywords, such as frame_rows=10.
 
     Raises:
@@ -165,7 +166,7 @@ def evaluate(
         InputError: If the data cannot be of this arm, or has too few rows.
         WorkError: If the frame rows determine too little.
     """
-    chosen = kinds.chosen(EvaluationOptions, options, more)
+    chosen, stages = kinds.chosen(EvaluationOptions, options, more), stages or no_stages
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     data, notices = admitted(data, calibration.robot)
     selection, left_out = _selection(calibration, data, chosen)
@@ -314,7 +315,7 @@ def _moved(
     """
     try:
         anew = evaluate(calibration, data, replace(options, keep_frames=False, keep_tool=False))
-    except (InputError, WorkError):
+    except TruearmError:
         return []
     best = calibration.model_name
     known_mm, misses = known_mean_mm(calibration), {notice.kind for notice in anew.notices}

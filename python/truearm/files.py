@@ -140,6 +140,7 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
 
     Raises:
         InputError: If it is none.
+        UsageError: If it is no text.
     """
     if not isinstance(text, str):
         raise UsageError(f"the text is of type {type(text).__name__}", where=where, rule="TOML is a text")

@@ -9,7 +9,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
+from truearm.errors import (
+    InputError,
+    Notice,
+    TruearmError,
+    UsageError,
+    did_you_mean,
+    list_names,
+    list_rows,
+    typed,
+)
 from truearm.joined_tables import join_tables
 from truearm.measurements import Measurements
 from truearm.named_values import JOINT
@@ -339,7 +348,7 @@ def _kept(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> Floats |
         return table.texts(name)
     try:
         return table.numbers(name)
-    except InputError:
+    except TruearmError:
         return table.texts(name)
 
 

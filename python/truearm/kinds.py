@@ -5,11 +5,13 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import fields
 from numbers import Integral, Real
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from truearm.errors import UsageError, did_you_mean, list_names
 
 T = TypeVar("T")
+Given = TypeVar("Given")
+Held = TypeVar("Held")
 
 WAYS: Final[Mapping[str, str]] = {
     "Calibration": 'Load it: Calibration.load("arm.calib")',
@@ -20,6 +22,27 @@ WAYS: Final[Mapping[str, str]] = {
     "Measurements": "Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
     "Robot": 'Load it: Robot.load("ur10"), or from a TOML or URDF file',
 }
+
+
+class Kept(Generic[Given, Held]):
+    """A field of a dataclass that is given in one type and held in another, for type checkers as well."""
+
+    def __init__(self, made: Callable[[Given, str], Held], usual: Held) -> None:
+        """`made` turns what is given, and the field's name, into what is held; `usual` is held by default."""
+        self._made, self._usual, self._name = made, usual, ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, options: object | None, kind: type | None = None) -> Held:
+        return self._usual if options is None else options.__dict__[self._name]
+
+    def __set__(self, options: object, given: Given) -> None:
+        options.__dict__[self._name] = self._made(given, self._name)
+
+
+Names = Kept[str | Sequence[str], tuple[str, ...]]
+Numbers = Kept[Iterable[int], tuple[int, ...]]
 
 NO_CHOICES: Final[Mapping[str, Sequence[object]]] = {}
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError
-from truearm.kinds import check_number
+from truearm.kinds import check_number, settle
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD, RADIANS_PER_DEGREE
 
@@ -51,6 +51,7 @@ class Limits:
     joint_limits: bool = True
 
     def __post_init__(self) -> None:
+        settle(self, flags=("joint_limits",))
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name == "joint_limits" or value is None:

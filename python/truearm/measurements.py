@@ -187,6 +187,7 @@ class Measurements:
 
         Raises:
             InputError: If the file is no such CSV, columns are missing, or values break a rule.
+            UsageError: If a unit or a kind of joint is not known.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
         file = as_path(path)
@@ -207,6 +208,7 @@ class Measurements:
 
         Raises:
             InputError: As for read_csv.
+            UsageError: As for read_csv.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
         file = as_path(path)
@@ -236,7 +238,8 @@ class Measurements:
             joints: As for read_csv.
 
         Raises:
-            InputError: As for read_csv, and if a file is named twice.
+            InputError: As for read_csv.
+            UsageError: As for read_csv, and if a file is named twice.
         """
         files = [as_path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
         for path in files:
@@ -277,6 +280,7 @@ class Measurements:
 
         Raises:
             InputError: If columns are missing or values break a rule.
+            UsageError: As for read_csv, and if it is no DataFrame.
         """
         required(frame, pd.DataFrame, "the table")
         if len(frame) == 0:

@@ -17,7 +17,7 @@ from truearm.description.robot_data import Convention, Joint, RobotData
 from truearm.description.robot_file import parse_robot_file
 from truearm.description.robot_table import table_fields
 from truearm.description.urdf import UrdfChain, read_urdf, urdf_chain
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.files import is_file, read_text
 from truearm.types import Floats
 from truearm.units import MRAD_PER_RAD
@@ -109,7 +109,7 @@ class Robot(RobotData):
         try:
             robot = cls(**robot_toml.fields_of(file))
             check_sizes(robot)
-        except InputError as error:
+        except TruearmError as error:
             raise error.at(where) from None
         return robot
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from truearm._core import Solver
-from truearm.branches import NUMERIC, starts, strayed
+from truearm.branches import NUMERIC, beside, crossed, starts, strayed
 from truearm.inverse import Inverse
 from truearm.limits import Task
 from truearm.robot import Robot
@@ -27,7 +27,8 @@ class Search:
     The core's search walks from the seed to the target. It may be held up at a singularity or a limit on the
     way though the seed's branch leads round it, and where the seed stands in a singularity, or where the
     calibrated arm is on the other side of one than the nominal arm, it judges by a side that means nothing.
-    What it refuses is looked for once more, from the nominal arm's solution on the seed's branch.
+    What it refuses is looked for once more, from the nominal arm's solution on the seed's branch; and, as the
+    nominal arm may not reach what the calibrated one does, from both sides of a singularity of the seed.
     """
 
     def __init__(
@@ -114,3 +115,16 @@ class Search:
             if number not in still:
                 found[places[row]] = readings[number]
                 del refused[places[row]]
+        for place in set(places) & set(refused):
+            readings = self._from_both_sides(poses[place], seeds[place], inverse)
+            if len(readings):
+                found[place] = readings[0]
+                del refused[place]
+
+    def _from_both_sides(self, pose: Floats, seed: Floats, inverse: Inverse) -> Floats:
+        """Readings (k, N) for a pose (4, 4), the nearest first, if the seed (N,) does not tell its side."""
+        begun = beside(inverse, seed)
+        readings, _ = self._once(np.tile(pose, (len(begun), 1, 1)), begun)
+        readings = readings[np.isfinite(readings).all(axis=1)]
+        readings = readings[~crossed(inverse, readings, np.tile(seed, (len(readings), 1)))]
+        return np.asarray(readings[np.argsort(np.linalg.norm(readings - seed, axis=1))])

@@ -15,7 +15,7 @@ from truearm.cell.protocols import Robot, Sensor
 from truearm.cell.run_up import RunUp
 from truearm.cell.schema import NotNegative, Positive, Quaternion, Section, Share, Vector3, checked
 from truearm.defaults import LINK_RADIUS_MM
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.files import parsed, read_text
 from truearm.planning.accessibility import AboveFloor, Rule
 from truearm.robot import Robot as Arm
@@ -240,7 +240,7 @@ class Cell:
 def _built(driver: Any, settings: BaseModel, arm: Arm, where: str) -> Any:  # noqa: ANN401 - of a user's own
     try:
         return driver(settings, arm)
-    except InputError as error:
+    except TruearmError as error:
         raise error.at(where) from None
     except Exception as error:
         raise InputError(

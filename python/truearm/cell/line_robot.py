@@ -15,7 +15,7 @@ from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import check_template, expression, filled, numbers_in, pattern_of
 from truearm.cell.protocols import Managed
 from truearm.cell.schema import Positive
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
 from truearm.types import Floats
@@ -242,7 +242,7 @@ def _checked(settings: LineRobot.Settings, names: tuple[str, ...]) -> re.Pattern
         if settings.move_pose is not None:
             key = "move_pose"
             check_template(settings.move_pose, POSE)
-    except InputError as error:
+    except TruearmError as error:
         raise error.at(f"robot, {key}") from None
     try:
         return pattern_of(settings.joints, names)

@@ -10,7 +10,7 @@ import numpy as np
 from truearm._core import CoreError, Posterior
 from truearm.certainty.successive import Successive
 from truearm.certainty.threes import in_threes
-from truearm.errors import InputError, WorkError
+from truearm.errors import InputError, UsageError, WorkError
 from truearm.fits.core_set import core_set
 from truearm.fits.endpoints import Endpoint
 from truearm.fits.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
@@ -241,6 +241,13 @@ class VariableSpread:
     inflation: float
     noises: tuple[float, float]
     place: SetupPlace
+
+    def __reduce__(self) -> tuple[object, ...]:
+        raise UsageError(
+            "what a calibration leaves uncertain is not pickled alone",
+            rule="It is worked out from the rows, which the calibration has",
+            way_out="Send the calibration, and take calibration.spread from that",
+        )
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "VariableSpread":

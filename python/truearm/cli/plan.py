@@ -164,7 +164,9 @@ def _check_counts(asked: Mapping[str, int | None]) -> None:
 
 
 def _check_outputs(output: Path, picture: Path | None, *inputs: Path | str | None) -> None:
-    """Raise InputError where no file can come, what is there is read, or a picture has no known format."""
+    """Raise InputError where no file can come or what is there is read, UsageError where one is asked for
+    twice or a picture has no known format.
+    """
     check_output(output, *inputs)
     if picture is None:
         return

@@ -50,6 +50,13 @@ class RobotData:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise InputError(f"{self.name!r}", where="name", rule="The name is a text that is not empty")
+        if not _is_unicode(self.name):
+            raise InputError(
+                f"{self.name!r}",
+                where="name",
+                rule="The name is text in Unicode, without halves of characters",
+                way_out="Give another name",
+            )
         n = len(self.joints)
         _check_known("convention", (self.convention,), get_args(Convention))
         _check_known("joints", self.joints, get_args(Joint))
@@ -89,6 +96,15 @@ class RobotData:
         reach = np.where(self.revolute, np.pi, open_m)
         low, high = self.limits.T
         return np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+
+
+def _is_unicode(text: str) -> bool:
+    """Whether files can hold a text: half of a surrogate pair, as of names in other encodings, is no text."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _check_known(field: str, values: Sequence[str], known: tuple[str, ...]) -> None:

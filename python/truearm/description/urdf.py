@@ -20,7 +20,7 @@ from truearm.description.urdf_limits import joint_limits
 from truearm.description.urdf_names import UrdfNames
 from truearm.description.urdf_rounding import rounded_by
 from truearm.description.xml_as_written import xml_as_written
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.files import read_text
 from truearm.types import Floats
 
@@ -71,7 +71,7 @@ def urdf_chain(text: str, base_link: str | None, tip_link: str | None, *, where:
     """
     try:
         return _read(text, base_link, tip_link)
-    except InputError as error:
+    except TruearmError as error:
         raise error.at(where) from None
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Final
 
 from truearm.doubts.of_results import ANOTHER_FRAME
-from truearm.errors import InputError, Notice, WorkError
+from truearm.errors import Notice, TruearmError
 from truearm.fits.fitting import Task, fit_rows
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.models import CONSTANT
@@ -34,7 +34,7 @@ def another_frame(task: Task, rows: Measurements, left_m: float) -> list[Notice]
     options = replace(task.options, model=CONSTANT, frame="free", features=())
     try:
         found_m = fit_rows(replace(task, arm=arm, options=options), rows).constant.noise[0]
-    except (InputError, WorkError):
+    except TruearmError:
         # Rows in which no frame can be found are no nearer to one.
         return []
     if found_m > BETTER * left_m:

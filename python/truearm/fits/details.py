@@ -78,7 +78,7 @@ class VariableDetails:
         hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range;
             "up" is the direction in the base frame that the sag block takes for up.
         evidence: Logarithm of the evidence at its maximum, on the rows that found it.
-        evaluations: How often it was evaluated there.
+        evaluations: How often it was evaluated to find that, rough searches that this one began at included.
         inflation: Factor on standard deviations that makes them agree with left-out residuals.
         unexplained_m: Standard deviation of a position's coordinate that is left: noise, and what the joints
             miss anew at every pose, where they were measured.

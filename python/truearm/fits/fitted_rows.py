@@ -40,10 +40,13 @@ class FittedRows:
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
             orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
             pair once.
-        score: Squared standardised residuals over their limit (n,); above one is an outlier.
-        distance_m: How far the farthest target of each row is from where the model has it (n,). A distance is
-            off by so much in its row, in both of a pair; those of a calibration are judged by constants that
-            rows far off do not bend, as are their scores.
+        score: Squared standardised residuals over their limit (n,); above one is an outlier. Of variable
+            models they are what the model leaves of a row that it was not fitted to (leave-one-out).
+        distance_m: How far the farthest target of each row is from where the model has it (n,). Of variable
+            models it is how far its first target is from where the model without the row has it, if that is
+            more: of rows of full weight it mostly is, of outliers, which the model hardly follows, both are
+            the same. A distance is off by so much in its row, in both of a pair; those of a calibration are
+            judged by constants that rows far off do not bend, as are their scores.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
@@ -87,7 +90,9 @@ class FittedRows:
 
     @property
     def turn_rad(self) -> Floats:
-        """How far each row (n,) is turned from how the model has it; NaN where orientation was not fitted."""
+        """How far each row (n,) is turned from how the model has it, as `residual` says: never leave-one-out,
+        which of outliers is the same. NaN where orientation was not fitted.
+        """
         if not self.orientation or self.data.orientations is None:
             return np.full(len(self.side), np.nan)
         return np.where(self.data.oriented, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)

@@ -130,6 +130,7 @@ class Fits:
         seconds: Time of the constant fit and of the one that varies.
         scheme: One of the paper's schemes beside the constants; None where it was not asked for.
         scheme_name: Its name.
+        evaluations: How often the evidence was evaluated to find the variable model's hyper-parameters.
     """
 
     data: Measurements
@@ -140,6 +141,14 @@ class Fits:
     seconds: dict[str, float]
     scheme: SchemeFit | None = None
     scheme_name: str = ""
+    evaluations: int = 0
+
+    def after(self, before: "Fits | None") -> "Fits":
+        """This one, with the time and the evaluations of a fit that its search began at."""
+        if before is None:
+            return self
+        seconds = {name: spent + before.seconds[name] for name, spent in self.seconds.items()}
+        return replace(self, seconds=seconds, evaluations=self.evaluations + before.evaluations)
 
     def models(self, arm: IdentifiedArm) -> dict[str, ArmModel]:
         """The fitted models by name."""
@@ -199,7 +208,8 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         with task.stages("dividing the workspace, and learning"), core_errors(data):
             scheme = _fit_scheme(task, constant, found, one_row_a_pose(data))
         seconds[task.options.model] = time.perf_counter() - began
-    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model)
+    evaluations = 0 if variable is None else variable.evaluations
+    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model, evaluations)
 
 
 @dataclass(frozen=True, eq=False)

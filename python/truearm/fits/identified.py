@@ -35,6 +35,9 @@ class IdentifiedArm:
     def __post_init__(self) -> None:
         required(self.robot, Robot, "the robot")
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return IdentifiedArm, (self.robot, self.frame, self.parallel_within_deg)
+
     @property
     def world_is_known(self) -> bool:
         """Whether there is no world_from_base."""

@@ -61,7 +61,7 @@ class CalibrationOptions:
     robust: Robust = ROBUST
     drift: Drifting = DRIFT
     refit: bool = True
-    features: tuple[str, ...] = ()
+    features: kinds.Names = kinds.Names(kinds.words, ())
     frame: Frame = FRAME
     judge_target: int = FIRST_TARGET
     degree: int = DEGREE
@@ -78,7 +78,6 @@ class CalibrationOptions:
         kinds.check_values(self, choices=CHOICES, positive=POSITIVE)
         if self.model in NETWORKS:
             self.scheme.check_network(fuzzy=self.model == FCMAC)
-        object.__setattr__(self, "features", kinds.words(self.features, "features"))
         if len(set(self.features)) < len(self.features):
             raise UsageError("a feature is named twice", where="features", rule="Each is named once")
         if self.features and self.model != "variable":

@@ -59,7 +59,7 @@ class SchemeOptions:
         table: Rows of the hash table in place of a row for each association cell.
     """
 
-    scheme_joints: tuple[int, ...] = MAJOR_JOINTS
+    scheme_joints: kinds.Numbers = kinds.Numbers(kinds.whole_numbers, MAJOR_JOINTS)
     demanded_mm: float = 0.1
     most_regions: int = 110
     region_rows: int = 20
@@ -69,7 +69,7 @@ class SchemeOptions:
     membership: Literal["gaussian", "bspline"] = "gaussian"
     composition: Literal["min", "product"] = "min"
     sigma_cells: float = 0.5
-    cells: tuple[int, ...] = ()
+    cells: kinds.Numbers = kinds.Numbers(kinds.whole_numbers, ())
     active: int = 3
     rate: float = 0.5
     normalise: Literal["printed", "squares"] = "printed"
@@ -80,8 +80,6 @@ class SchemeOptions:
     def __post_init__(self) -> None:
         kinds.settle(self, whole=WHOLE, numbers=("sigma_cells", "rate", "tolerance_mm", "demanded_mm"))
         kinds.check_values(self, choices=KNOWN, positive=POSITIVE, not_negative=("demanded_mm",))
-        for name in ("scheme_joints", "cells"):
-            object.__setattr__(self, name, kinds.whole_numbers(getattr(self, name), name))
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):
             raise UsageError(f"{list(self.scheme_joints)}", where="scheme_joints", rule="Each joint once")
         if self.cells and len(self.cells) != len(self.scheme_joints):

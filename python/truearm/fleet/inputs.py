@@ -58,6 +58,7 @@ def find_inputs(entry: Entry, output: Path) -> Inputs:
 
     Raises:
         InputError: If a file is not there or cannot be used.
+        UsageError: If the last calibration is one that the new one would be written over.
     """
     robot = Robot.load(_robot(entry))
     files = tuple(file for pattern in entry.measurements for file in _matching(entry.folder, pattern))

@@ -129,7 +129,8 @@ class Rewritten:
             several tools.
         correction_mrad: How far it turned, (t,).
         std_mm: Standard deviation of the tool's place there, (t,): of the calibration, of the tool and, for
-            Cartesian targets, of the work object, as far as the frames file tells theirs.
+            Cartesian targets, of the work object, as far as the frames file tells theirs. As in `Compensated`
+            the calibration's is exact with constants alone, and a bound with a variable model.
         residual_mm: How far from its place the tool stays, (t,): more than rounding where fewer joints may
             move than the task needs.
         residual_mrad: How far turned from it, (t,).

@@ -71,7 +71,7 @@ def _options(facts: Facts) -> Table:
         "Options that differ from the defaults come first, in bold." if changed else "All are the defaults."
     )
     return Table(
-        "CalibrationOptions",
+        "Options",
         ["option", "value"],
         [[words[name], _value(facts, name, used[name])] for name in names],
         says=says,

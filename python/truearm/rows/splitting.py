@@ -69,6 +69,12 @@ class HoldoutRange:
         return f"q{self.joint}:{'high' if self.high else 'low'}:{self.share!r}"
 
 
+def _as_range(given: object, name: str) -> HoldoutRange | None:
+    if given is None:
+        return None
+    return kinds.required(HoldoutRange.parse(given) if isinstance(given, str) else given, HoldoutRange, name)
+
+
 @dataclass(frozen=True)
 class SplitRule:
     """How rows are divided; for each file alone, with numpy.random.default_rng(seed).
@@ -103,19 +109,13 @@ class SplitRule:
     holdout: float = HOLDOUT
     seed: int = SEED
     train_size: int | None = None
-    split_by: tuple[str, ...] = ()
-    holdout_range: HoldoutRange | None = None
+    split_by: kinds.Names = kinds.Names(kinds.words, ())
+    holdout_range: kinds.Kept[str | HoldoutRange | None, HoldoutRange | None] = kinds.Kept(_as_range, None)
     by_purpose: bool = True
 
     def __post_init__(self) -> None:
         kinds.settle(self, whole=("seed", "train_size"), numbers=("holdout",), flags=("by_purpose",))
         kinds.check_values(self, positive=("train_size",), not_negative=("seed",))
-        object.__setattr__(self, "split_by", kinds.words(self.split_by, "split_by"))
-        tail: object = self.holdout_range
-        if tail is not None:
-            read = HoldoutRange.parse(tail) if isinstance(tail, str) else tail
-            kinds.required(read, HoldoutRange, "the range to hold out")
-            object.__setattr__(self, "holdout_range", read)
         _check_share(self.holdout, "the share to hold out")
         if self.split_by and self.holdout_range is not None:
             raise UsageError(

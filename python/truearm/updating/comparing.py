@@ -17,6 +17,7 @@ from truearm.errors import (
     InputError,
     Notice,
     TooFewError,
+    TruearmError,
     UsageError,
     WorkError,
     count_of,
@@ -177,7 +178,7 @@ def update(
     data: Measurements | Sequence[Measurements],
     options: UpdateOptions | None = None,
     *,
-    stages: Stages = no_stages,
+    stages: Stages | None = None,
     **more: Any,
 ) -> Update:
     """Take a calibration over to the arm as it is now, after re-mastering, a crash or a change of motor.
@@ -190,7 +191,8 @@ def update(
         data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 1500
             measured values (500 points) so many are used, spread evenly over the poses.
         options: What may have moved; defaults without them.
-        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        stages: Called with the name of each stage; gives a context manager that surrounds it; None
+            for nobody.
         **more: The same options as keywords, such as keep_frame=True.
 
     Raises:
@@ -199,7 +201,7 @@ def update(
         WorkError: If the calibration is of a scheme, has a field and is stripped, or does not tell from how
             many values its scale is known; or if what is found is not plausible.
     """
-    chosen = kinds.chosen(UpdateOptions, options, more)
+    chosen, stages = kinds.chosen(UpdateOptions, options, more), stages or no_stages
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     data, notices = admitted(data, calibration.robot)
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
@@ -247,7 +249,7 @@ def slipped_meanwhile(calibration: Calibration, data: Measurements, use: Use | N
         unknowns = Unknowns.of(calibration, task, options, data)
         rows, _ = _without_outliers(calibration, _Rows.of(Scene(task, data, calibration, unknowns)))
         return meanwhile(rows.scene, estimate(rows.scene, rows.scatter, rows.start, unknowns.free))
-    except (InputError, WorkError, UsageError):
+    except TruearmError:
         return []
 
 

@@ -11,7 +11,7 @@ from truearm.cell.line_sensor import LineSensor
 from truearm.cell.patterns import expression_for, filled, numbers_in
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import ROOM_C, World
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.types import Floats
 from truearm.units import to_si
 
@@ -132,7 +132,7 @@ def check_faults(settings: LineSensor.Settings, simulate: SimulateSection, where
     missed = simulate.faults.missed
     try:
         line = line_without_point(settings, simulate)
-    except InputError as error:
+    except TruearmError as error:
         raise error.at(f"{where}, simulate, answer") from None
     if missed > 0.0 and line is None:
         raise InputError(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.defaults import SEED
-from truearm.errors import InputError, Notice, UsageError, count_of, list_names
+from truearm.errors import InputError, Notice, TruearmError, UsageError, count_of, list_names
 from truearm.studies.accuracy.sets import DataSet, read_set
 from truearm.studies.accuracy.splits import TITLES, Cut, Kind, cuts, divide, rows_of, why_no_cut
 
@@ -163,5 +163,5 @@ def _cells_of(
             if poses <= available:
                 rows_of(data_set, cut, seed[1], poses)
                 yield Cell(data_set, cut, size, poses, seed[1])
-        except InputError as error:
+        except TruearmError as error:
             yield f"{cut}, because {error.what}"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from truearm.cell.measuring import Progress
-from truearm.errors import InputError
+from truearm.errors import InputError, TruearmError
 from truearm.files import make_directory, write_whole
 from truearm.stages import Stages, no_stages
 from truearm.studies.metrics import over_seeds
@@ -98,7 +98,7 @@ def _elsewhere(item: tuple[Setting, Path]) -> Result:
         )
     try:
         return _conduct(setting, directory, _untold, no_stages)[0]
-    except InputError as error:
+    except TruearmError as error:
         raise error.at(f"arm {setting.seed}") from None
 
 
