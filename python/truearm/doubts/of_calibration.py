@@ -12,6 +12,7 @@ from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
 from truearm.doubts.few_judged import FewJudged
 from truearm.doubts.known_world import another_frame
+from truearm.doubts.masked_rows import bent_notice
 from truearm.doubts.moved_joints import moved_joints
 from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
@@ -116,14 +117,19 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
     """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows, and `robust`
     are constants that rows far off did not bend, if there are such.
     """
-    rows = found.rows
-    if rows is None or found.scheme is not None or found.selection.distances:
+    rows, bent = found.rows, list[Notice]()
+    if rows is None:
         return []
     if may_be_bent(found) and rows.outliers():
-        found, rows = _of_constants(task, found, rows, robust or unbent(task, rows))
+        robust = robust or unbent(task, rows)
+        bent = bent_notice(found, robust)
+    if found.scheme is not None or found.selection.distances:
+        return bent
+    if robust is not None and rows.outliers():
+        found, rows = _of_constants(task, found, rows, robust)
     seen = Whitened.of(found, rows, progress)
     slipped = slips(found, rows, seen, progress) or _slips_by_constants(task, found, rows, progress)
-    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
+    return [*bent, *uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
 
 
 def _reason(task: Task, found: Calibration, progress: Floats) -> list[Notice]:
