@@ -29,10 +29,10 @@ BENT: Final = "bent"
 MOST_TESTED: Final = 20
 """Rows far off, those nearest to the limit, each of which is tested by a fit of its own."""
 LOWER: Final = 0.75
-"""Ratio of what constants leave without the points that are far off and with them, below which points bend them.
+"""Ratio of what constants leave without points that are far off and with them, below which these bend them.
 
-What varies with the pose has longer tails than noise: a robust loss takes them for far off, too, but little is
-gained without them.
+What varies with the pose has longer tails than noise: a robust loss takes them for far off, too, but little
+is gained without them.
 """
 
 

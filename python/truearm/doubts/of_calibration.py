@@ -44,6 +44,7 @@ from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
 from truearm.judgement.judging import check_judged
 from truearm.measurements import Measurements
+from truearm.rows.linked_pairs import pairs_between
 from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
 from truearm.stages import Stages, no_stages
@@ -62,7 +63,11 @@ WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *REASONS}
 def of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
     """Of which held-out rows errors say less, and which are not judged."""
     train, held = given.select(split.train), given.select(split.holdout)
-    return [*measured_on_both_sides(given, split), *check_judged(train, held, task.selection)]
+    return [
+        *measured_on_both_sides(given, split),
+        *pairs_between(given, split),
+        *check_judged(train, held, task.selection),
+    ]
 
 
 def of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
