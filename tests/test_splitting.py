@@ -193,9 +193,7 @@ def test_pairs_with_one_row_that_all_share_are_said_to_leave_nothing_to_hold_out
     frame = table(60).assign(pair=np.repeat([f"p{k}" for k in range(30)], 2), distance=1.0)
     joints = [f"q{k}" for k in (1, 2, 3)]
     frame.loc[frame.index[::2], joints] = frame.loc[frame.index[0], joints].to_numpy()
-    with pytest.raises(
-        InputError, match='(?s)rows of a pair are on one side.*"anchor" in place of'
-    ):
+    with pytest.raises(InputError, match='(?s)rows of a pair are on one side.*"anchor" in place of'):
         split_rows(Measurements.from_dataframe(frame.drop(columns=["x", "y", "z"])), SplitRule(seed=1))
 
 

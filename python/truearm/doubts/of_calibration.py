@@ -25,6 +25,7 @@ from truearm.doubts.of_results import (
     poses_aside,
     stated_too_large,
 )
+from truearm.doubts.one_anchor import one_anchor
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers, judged_means_mm
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
@@ -66,6 +67,7 @@ def of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
     return [
         *measured_on_both_sides(given, split),
         *pairs_between(given, split),
+        *one_anchor(given, task.selection),
         *check_judged(train, held, task.selection),
     ]
 
