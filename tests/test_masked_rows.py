@@ -83,3 +83,11 @@ def test_a_set_up_that_is_off_as_a_whole_is_judged_with_the_others():
     table.loc[few, "group"] = "b"
     table.loc[few, "x"] += 0.05 * np.random.default_rng(1).normal(size=len(few))
     assert set(named(calibrated(table))) <= set(few)
+
+
+def test_few_rows_that_hide_behind_what_varies_are_named():
+    arm = VirtualArm(ROBOT, seed=3, imperfections=replace(VARYING, noise_mm=0.08))
+    table = arm.measure_table(arm.poses(40))
+    table.loc[OFF, ["x", "y", "z"]] += 1e-3 * np.eye(3)
+    found = ta.calibrate(ROBOT, ta.Measurements.from_dataframe(table), threads=1)
+    assert sorted(named(found)) == OFF

@@ -16,7 +16,16 @@ from truearm.doubts.unbent import UNBENT, unbent
 from truearm.errors import Notice, list_outliers
 from truearm.fits.core_set import core_set, distance_ends
 from truearm.fits.fitted_rows import OVERWHELMING, FittedRows, at_rows
-from truearm.fits.fitting import MOST_FAR, Fits, Task, constant_variances, core_errors, fit_options
+from truearm.fits.fitting import (
+    LOWER,
+    MOST_FAR,
+    Fits,
+    Task,
+    bent,
+    constant_variances,
+    core_errors,
+    fit_options,
+)
 from truearm.lengths import length_mm
 from truearm.outlier_fate import fate_of_outliers
 from truearm.types import Floats, Mask, Rows
@@ -28,12 +37,6 @@ if TYPE_CHECKING:
 BENT: Final = "bent"
 MOST_TESTED: Final = 20
 """Rows far off, those nearest to the limit, each of which is tested by a fit of its own."""
-LOWER: Final = 0.75
-"""Ratio of what constants leave without points that are far off and with them, below which these bend them.
-
-What varies with the pose has longer tails than noise: a robust loss takes them for far off, too, but little
-is gained without them.
-"""
 
 
 def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
@@ -51,9 +54,8 @@ def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
     if task.selection.distances:
         score = _Judged.of(task, apart).confirmed(judged.score) if far.any() else judged.score
         return replace(rows, score=score, distance_m=judged.distance_m)
-    if not 0.0 < far.mean() <= MOST_FAR or not (found := _Judged.of(task, apart)).is_lower(
-        fits.constant, far
-    ):
+    found = _Judged.of(task, apart)
+    if not 0.0 < far.mean() <= MOST_FAR or not bent(fits.constant, found.least_squares(far)):
         return rows
     score = found.confirmed(judged.score)
     return replace(rows, score=score, distance_m=judged.distance_m) if (score > 1.0).any() else rows
@@ -95,11 +97,6 @@ class _Judged:
         distances = task.selection.distances
         return cls(task, apart, distance_ends(apart.data)[:, 0] if distances else np.arange(len(apart.data)))
 
-    def is_lower(self, bent: ConstantFit, far: Mask) -> bool:
-        """Whether least squares without what is far off (k,) leave far less than `bent` constants."""
-        without = self._least_squares(far)
-        return any(less < LOWER * more for less, more in zip(without.noise, bent.noise, strict=True))
-
     def confirmed(self, score: Floats) -> Floats:
         """Scores (n,), less where rows were taken for far off that least squares would explain."""
         own = score[self.first]
@@ -114,7 +111,7 @@ class _Judged:
         from scipy.special import fdtri  # noqa: PLC0415 - slow to import
 
         far = own > 1.0
-        without = self._least_squares(far)
+        without = self.least_squares(far)
         values = np.maximum((self._of_each(without) != 0.0).sum(axis=1), 1)
         free = int(values[~far].sum()) - self.apart.identifiability.total_rank
         order = np.flatnonzero(far)
@@ -126,7 +123,7 @@ class _Judged:
         for place in order[np.argsort(own[order], kind="stable")][:MOST_TESTED].tolist():
             others = far.copy()
             others[place] = False
-            more = self._left(self._least_squares(others), variance, others) - left
+            more = self._left(self.least_squares(others), variance, others) - left
             limit = fdtri(values[place], free, 1.0 - OVERWHELMING)
             yield place, more / values[place] / (left / free) / limit
 
@@ -138,7 +135,7 @@ class _Judged:
         """Squares that a fit leaves, in parts of their variances (k, m), of all but those `apart` (k,)."""
         return float((self._of_each(fit) ** 2 / variance)[~apart].sum())
 
-    def _least_squares(self, far: Mask) -> ConstantFit:
+    def least_squares(self, far: Mask) -> ConstantFit:
         """Constants without those that are far off (k,).
 
         Their weights are the squares of those that the robust loss gave them: the farther off, the less they
