@@ -156,4 +156,4 @@ def test_a_robust_fit_is_advised_where_it_is_none(tmp_path, monkeypatch, capsys,
     assert main(["calibrate", "rv-m2", "m.csv", *options]) == 0
     words = " ".join(capsys.readouterr().out.split())
     assert said in words
-    assert ("--robust huber gives" in words) == advised
+    assert ("--robust cauchy gives" in words) == advised

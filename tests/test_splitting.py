@@ -8,6 +8,7 @@ from truearm.errors import InputError, UsageError
 from truearm.fits.core_set import distance_count
 from truearm.fits.options import CalibrationOptions
 from truearm.measurements import Measurements
+from truearm.rows.linked_pairs import pairs_between
 from truearm.rows.splitting import HoldoutRange, SplitRule, split_rows
 
 
@@ -142,11 +143,57 @@ def test_a_chain_of_pairs_is_parted_and_loses_few_of_them():
     assert not poses_of[0] & poses_of[1]
 
 
+def distances_between(ends):
+    """Distances of poses, each of two of them by their numbers."""
+    places = np.ravel(ends)
+    frame = table(int(places.max()) + 1).iloc[places].drop(columns=["x", "y", "z"])
+    pairs = np.repeat([f"p{k}" for k in range(len(ends))], 2)
+    return Measurements.from_dataframe(frame.assign(pair=pairs, distance=1.0))
+
+
+def test_chains_in_several_files_are_parted_each(tmp_path):
+    chain = [(k, k + 1) for k in range(20)]
+    files = [tmp_path / f"chain{k}.csv" for k in range(6)]
+    for file in files:
+        places = np.ravel(chain)
+        frame = table(21).iloc[places].drop(columns=["x", "y", "z"]) + len(file.name)
+        frame["pair"], frame["distance"] = np.repeat([f"p{k}" for k in range(20)], 2), 1.0
+        frame["q1"] += 0.1 * files.index(file)
+        frame.to_csv(file, index=False)
+    data = Measurements.read_files(files)
+    split = split_rows(data, SplitRule())
+    for file in data.files:
+        assert 4 <= (data.sources[split.holdout] == file).sum() <= 16
+
+
+def test_of_stretches_the_share_is_held_out():
+    for seed in range(8):
+        split = split_rows(distances_between([(k, k + 1) for k in range(100)]), SplitRule(seed=seed))
+        assert 48 <= len(split.holdout) <= 64
+
+
+def test_a_chain_that_was_measured_in_any_order_loses_few_pairs():
+    order = np.random.default_rng(1).permutation(100)
+    split = split_rows(distances_between([(k, k + 1) for k in order]), SplitRule())
+    assert split.between == 200 - len(split.train) - len(split.holdout) <= 30
+
+
+def test_pairs_that_neither_train_nor_are_judged_are_counted():
+    rng = np.random.default_rng(3)
+    data = distances_between([rng.choice(100, 2, replace=False) for _ in range(100)])
+    split = split_rows(data, SplitRule())
+    (told,) = pairs_between(data, split)
+    assert f"{split.between // 2} of 100 distances go from poses that train" in told.message
+    assert f"{len(split.holdout) // 2} are judged" in told.message
+    chain = distances_between([(k, k + 1) for k in range(100)])
+    assert pairs_between(chain, split_rows(chain, SplitRule())) == []
+
+
 def test_pairs_with_one_row_that_all_share_are_said_to_leave_nothing_to_hold_out():
     frame = table(60).assign(pair=np.repeat([f"p{k}" for k in range(30)], 2), distance=1.0)
     joints = [f"q{k}" for k in (1, 2, 3)]
     frame.loc[frame.index[::2], joints] = frame.loc[frame.index[0], joints].to_numpy()
-    with pytest.raises(InputError, match="two rows of a pair are on one side"):
+    with pytest.raises(InputError, match='(?s)rows of a pair are on one side.*"anchor" in place of'):
         split_rows(Measurements.from_dataframe(frame.drop(columns=["x", "y", "z"])), SplitRule(seed=1))
 
 

@@ -13,7 +13,7 @@ from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import constant_details
 from truearm.certainty.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.doubts.admitted import admitted
-from truearm.doubts.gross_distances import distances_judged
+from truearm.doubts.masked_rows import judged_unbent
 from truearm.doubts.of_calibration import of_fit, of_result, of_split
 from truearm.doubts.of_results import orientations_left_out, seen_at_values, stood_still
 from truearm.doubts.row_order import order_notices
@@ -224,8 +224,7 @@ def _fitted_rows(
     """The rows of the last fit as they were measured; `given` are all rows, which of them, and the split."""
     data, order, split = given
     rows = FittedRows.of(final, sides(len(data), split)[order], task.selection)
-    if task.selection.distances:
-        rows = distances_judged(task, rows, final)
+    rows = judged_unbent(task, rows, final)
     if not drift:
         return rows
     return replace(rows, data=data.select(order), moved=drift.moved[order], progress=drift.progress[order])

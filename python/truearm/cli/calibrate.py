@@ -287,6 +287,7 @@ def _judged_in_words(calibration: "Calibration") -> str:
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
     from truearm.fits.models import CONSTANT, leaves_noise
+    from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
     from truearm.storage.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
@@ -297,10 +298,12 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     name = calibration.model_name
     also = "with constants alone" if name == CONSTANT else f"with the model {name}"
     it = "With that sigma it" if beyond else "It"
+    kept = bool(summary["outliers"]) and fate_of_outliers(calibration) == FULL_WEIGHT
+    noise = "noise, the outliers" if kept else "noise"
     alone = (
         f"Mean error that noise alone would leave: {left}."
         if leaves_noise(name)
-        else f"{it} makes a mean error of {left}: noise and, {also}, what varies with the joints."
+        else f"{it} makes a mean error of {left}: {noise} and, {also}, what varies with the joints."
     )
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
@@ -356,7 +359,7 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     fate = fate_of_outliers(calibration)
     hint = {
         TAKEN_OUT: " Constants, frame and tool are without them where they bend these.",
-        FULL_WEIGHT: " --robust huber gives them less weight.",
+        FULL_WEIGHT: " --robust cauchy gives them hardly any weight.",
     }.get(fate, "")
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, calibration.rows.data.files)}.{hint}")
     without = Outliers.of(calibration)

@@ -12,6 +12,7 @@ from truearm.doubts.distance_zero import zero_notices
 from truearm.doubts.exchanged import exchanges
 from truearm.doubts.few_judged import FewJudged
 from truearm.doubts.known_world import another_frame
+from truearm.doubts.masked_rows import bent_notice
 from truearm.doubts.moved_joints import moved_joints
 from truearm.doubts.of_results import (
     FAR_FROM_NOMINAL,
@@ -24,6 +25,7 @@ from truearm.doubts.of_results import (
     poses_aside,
     stated_too_large,
 )
+from truearm.doubts.one_anchor import one_anchor
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers, judged_means_mm
 from truearm.doubts.rounded_readings import rounded_notices
 from truearm.doubts.row_lag import CHANGE, fits_shifted
@@ -43,6 +45,7 @@ from truearm.fits.identifiability import Identifiability
 from truearm.fits.models import CONSTANT, NOMINAL, ArmModel
 from truearm.judgement.judging import check_judged
 from truearm.measurements import Measurements
+from truearm.rows.linked_pairs import pairs_between
 from truearm.rows.splitting import Split, measured_on_both_sides
 from truearm.rows.visits import pose_count
 from truearm.stages import Stages, no_stages
@@ -61,7 +64,12 @@ WRONG_ROWS: Final = {NO_HELP, SINGLE_ROWS, *REASONS}
 def of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
     """Of which held-out rows errors say less, and which are not judged."""
     train, held = given.select(split.train), given.select(split.holdout)
-    return [*measured_on_both_sides(given, split), *check_judged(train, held, task.selection)]
+    return [
+        *measured_on_both_sides(given, split),
+        *pairs_between(given, split),
+        *one_anchor(given, task.selection),
+        *check_judged(train, held, task.selection),
+    ]
 
 
 def of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
@@ -116,14 +124,19 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
     """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows, and `robust`
     are constants that rows far off did not bend, if there are such.
     """
-    rows = found.rows
-    if rows is None or found.scheme is not None or found.selection.distances:
+    rows, bent = found.rows, list[Notice]()
+    if rows is None:
         return []
     if may_be_bent(found) and rows.outliers():
-        found, rows = _of_constants(task, found, rows, robust or unbent(task, rows))
+        robust = robust or unbent(task, rows)
+        bent = bent_notice(found, robust)
+    if found.scheme is not None or found.selection.distances:
+        return bent
+    if robust is not None and rows.outliers():
+        found, rows = _of_constants(task, found, rows, robust)
     seen = Whitened.of(found, rows, progress)
     slipped = slips(found, rows, seen, progress) or _slips_by_constants(task, found, rows, progress)
-    return [*uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
+    return [*bent, *uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
 
 
 def _reason(task: Task, found: Calibration, progress: Floats) -> list[Notice]:

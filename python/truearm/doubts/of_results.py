@@ -10,6 +10,7 @@ from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.doubts.grids import BETWEEN, grid_steps, grid_words
 from truearm.doubts.held_tool import TURN_MORE, held_tool, held_words
+from truearm.doubts.one_anchor import ONE_ANCHOR
 from truearm.doubts.outliers import NO_OUTLIERS, STATED_TOO_LARGE, Outliers, judged_means_mm
 from truearm.doubts.what_to_check import CHECKS
 from truearm.errors import Notice, count_of
@@ -81,8 +82,8 @@ WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE, ANOTHER_FRAME, 
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"
 HELD_TOOL: Final = "held_tool"
-HIDING: Final = (FEW_VALUES, HELD_TOOL)
-"""What leaves a part of the errors out of held-out poses too; grids do as well."""
+HIDING: Final = (FEW_VALUES, HELD_TOOL, ONE_ANCHOR)
+"""What leaves a part of the errors out of held-out rows too; grids do as well."""
 
 
 def doubts(

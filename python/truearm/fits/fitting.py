@@ -40,8 +40,14 @@ Hyper = dict[str, list[float]]
 
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
-FAR_FROM_CONSTANTS: Final = 0.1
-"""Weight that Cauchy's loss gives a row some seven deviations from what constants leave."""
+FAR_FROM_CONSTANTS: Final = 0.36
+"""Weight that Cauchy's loss gives a point which noise takes so far off once in a million."""
+LOWER: Final = 0.75
+"""Ratio of what constants leave without what is far off and with it, below which that bends them.
+
+What varies with the pose has longer tails than noise: a robust loss takes them for far off, too, but little
+is gained without them.
+"""
 MOST_FAR: Final = 0.25
 """Share of such rows from which they are no outliers."""
 SUSPECTED: Final = 1e-4
@@ -50,6 +56,8 @@ CLEARER: Final = 0.7
 """Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
 PROMISING: Final = 0.85
 """That ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
+ODDS: Final = 1e-6
+"""That a row is an outlier, before anything is known of it: evidence has to surpass it for each one."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
@@ -278,14 +286,36 @@ def _unmasked(
     with core_errors(data):
         robust = fit_constant(problem, fit_options(task.threads, prior=task.options.prior, robust="cauchy"))
     far = robust.weights < FAR_FROM_CONSTANTS
-    if not far[variable.weights >= 1.0].any() or far.mean() > MOST_FAR:
+    if (
+        not far[variable.weights >= 1.0].any()
+        or far.mean() > MOST_FAR
+        or not bent(constants.constant, robust)
+    ):
         return fits
-    weights, before = np.where(far, SUSPECTED, 1.0), np.median(variable.distances)
+    weights = np.where(far, SUSPECTED, 1.0)
     _, rough = _without_outliers(task, data, weights, KnownHyper(near=variable, rough=True))
-    if np.median(rough.distances) > PROMISING * before:
+    if not _is_clearer(rough, variable, PROMISING):
         return fits
     found = _without_outliers(task, data, weights, NOTHING_KNOWN)
-    return found if np.median(found[1].distances) < CLEARER * before else fits
+    return found if _is_clearer(found[1], variable, CLEARER) else fits
+
+
+def bent(constant: ConstantFit, without: ConstantFit) -> bool:
+    """Whether constants leave far more than others that what is far off does not bend."""
+    return any(less < LOWER * more for less, more in zip(without.noise, constant.noise, strict=True))
+
+
+def _is_clearer(found: FieldFit, before: FieldFit, ratio: float) -> bool:
+    """Whether a fit without some rows is better by the median of distances, or by evidence.
+
+    Evidence counts what outliers cost: they have a noise of their own. Of more rows than hyper-parameters
+    are found from it is of a part.
+    """
+    if np.median(found.distances) < ratio * np.median(before.distances):
+        return True
+    more = int((found.weights < 1.0).sum()) - int((before.weights < 1.0).sum())
+    gain = found.evidence - before.evidence
+    return len(found.weights) <= ENOUGH_FOR_HYPER and gain > -np.log(ODDS) * max(more, 1)
 
 
 def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data: Measurements) -> SchemeFit:

@@ -19,6 +19,7 @@ from truearm.doubts.of_results import (
     WOULD_FIT,
     to_check,
 )
+from truearm.doubts.one_anchor import ONE_ANCHOR
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
 from truearm.doubts.uneven_setups import UNEVEN_SETUPS
@@ -277,6 +278,11 @@ def _held_one_way(facts: Facts) -> Iterator[Advice]:
         yield Advice("turn_the_wrist", "Turn the wrist.", words, facts.mean_mm())
 
 
+def _to_one_anchor(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(ONE_ANCHOR):
+        yield Advice(ONE_ANCHOR, "Measure to further points.", words, 2.0 * facts.mean_mm())
+
+
 def _in_order(facts: Facts) -> Iterator[Advice]:
     if words := facts.noticed(ORDER_OF_POSES):
         yield Advice("another_order", "Measure in another order.", words, 0.5 * facts.mean_mm())
@@ -422,6 +428,7 @@ RULES: Final = (
     _on_a_grid,
     _at_few_values,
     _held_one_way,
+    _to_one_anchor,
     _in_order,
     _stated_sigma,
     _noise_or_poses,

@@ -13,6 +13,7 @@ from truearm import kinds
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, Notice, UsageError, count_of, did_you_mean, list_names
 from truearm.measurements import Measurements
+from truearm.rows.linked_pairs import COMMON_POSE, components, in_stretches, on_one_side
 from truearm.rows.visits import pose_numbers, visit_numbers
 from truearm.tables.columns import VALIDATE
 from truearm.types import Mask, Rows
@@ -20,12 +21,6 @@ from truearm.types import Mask, Rows
 NAMED: Final = 5
 FEW_KNOWN: Final = 0.05
 """Share of held-out rows of poses that trained, which changes next to nothing in their errors."""
-LINKED: Final = 0.2
-"""Share of all rows above which those that pairs link are parted."""
-STRETCHES: Final = 20
-"""How many stretches of poses they are parted into,"""
-SHORTEST: Final = 5
-"""each of so many poses at the least; fewer than two such stretches are not parted."""
 RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
 
 
@@ -89,9 +84,10 @@ class SplitRule:
     and `holdout_range` come first.
 
     Rows with the same joint vector, rows after one another that were read within 0.3 mrad or mm of one
-    pose, and the two rows of a pair, stay together, on the side of the first. Where pairs link more than a
-    fifth of all rows, as in a chain in which each pose is in two of them, stretches of its poses, in the
-    order of the rows, stay together, and pairs between both sides take no part but in the last fit.
+    pose, and the two rows of a pair, stay together, on the side of the first. Where pairs link a fifth of the
+    rows of a file or more, as in a chain in which each pose is in two of them, stretches of its poses, from
+    pair to pair, stay together, the last share of them is held out, as the permutation has their first rows,
+    and pairs between both sides take no part but in the last fit.
     `train_size` takes no half of a pair: one that does not fit is passed over, for what comes next in the
     permutation.
 
@@ -132,11 +128,26 @@ class Split:
         train: Training rows (t,), in the permutations' order.
         holdout: Held-out rows (h,), in the permutations' order.
         planned: How many of them are held out because they were planned to validate.
+        between: How many rows are on neither side, of pairs with one row on either.
     """
 
     train: Rows
     holdout: Rows
     planned: int = 0
+    between: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Kin:
+    """Rows that must stay on the same side.
+
+    Attributes:
+        first: For each row (n,) the first such row.
+        parted: Which rows (n,) are of stretches of poses that pairs link to others.
+    """
+
+    first: Rows
+    parted: Mask
 
 
 def split_rows(data: Measurements, rule: SplitRule) -> Split:
@@ -146,12 +157,13 @@ def split_rows(data: Measurements, rule: SplitRule) -> Split:
         UsageError: If a column or joint is not there, or the train size reaches into the held-out rows.
         InputError: If no rows would train or be held out, or a held-out set-up has no training rows.
     """
-    first_of = _first_of_kin(data)
-    parts = [_split_file(data, np.flatnonzero(data.sources == file), first_of, rule) for file in data.files]
+    kin = _kin_of(data)
+    parts = [_split_file(data, np.flatnonzero(data.sources == file), kin, rule) for file in data.files]
     split = Split(
         train=np.concatenate([part.train for part in parts]),
         holdout=np.concatenate([part.holdout for part in parts]),
         planned=sum(part.planned for part in parts),
+        between=sum(part.between for part in parts),
     )
     _check_groups(data, split, rule)
     return split
@@ -189,8 +201,8 @@ def _trained(count: int, share: float) -> int:
     return int((1.0 - share) * count)
 
 
-def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule) -> Split:
-    """Split the rows (r,) of one file; `first_of` (n,) names each row's first kin."""
+def _split_file(data: Measurements, rows: Rows, kin: _Kin, rule: SplitRule) -> Split:
+    """Split the rows (r,) of one file; `kin` are those (n,) that stay together."""
     rng = np.random.default_rng(rule.seed)
     planned = _planned(data, rows, rule)
     if planned.any():
@@ -203,14 +215,16 @@ def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule)
         order = rng.permutation(len(rows))
         held = np.zeros(len(rows), dtype=np.bool_)
         held[order[_trained(len(rows), rule.holdout) :]] = True
-    held = _together(held, rows, first_of)
-    whole = _on_one_side(data, rows, held)
+        held = _drawn_stretches(kin, rows, held, order, rule.holdout)
+    held = _together(held, rows, kin.first)
+    whole = on_one_side(data, rows, held)
     if rule.split_by or rule.holdout_range is not None or planned.any():
         order = np.concatenate([rng.permutation(np.flatnonzero(~held)), np.flatnonzero(held)])
     train, holdout = order[(~held & whole)[order]], order[(held & whole)[order]]
+    between = int((~whole).sum())
     _check_sizes(len(train), len(holdout), rule, data.select(rows))
     count = len(holdout) if planned.any() else 0
-    return Split(train=_first(data, rows[train], rule), holdout=rows[holdout], planned=count)
+    return Split(_first(data, rows[train], rule), rows[holdout], count, between)
 
 
 def _first(data: Measurements, train: Rows, rule: SplitRule) -> Rows:
@@ -315,62 +329,28 @@ def split_columns(data: Measurements) -> dict[str, NDArray[np.float64]]:
     return known | {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}
 
 
-def _first_of_kin(data: Measurements) -> Rows:
-    """For each row (n,) the first row that must stay on the same side."""
+def _kin_of(data: Measurements) -> _Kin:
+    """Which rows must stay together."""
     count = len(data)
     _, alike = np.unique(data.readings, axis=0, return_inverse=True)
-    links = [alike.reshape(-1), visit_numbers(data.readings, data.sources)]
-    kin = np.arange(count)
-    for labels in links:
-        kin = _components(kin, labels)
+    kin, parted = np.arange(count), np.zeros(count, dtype=np.bool_)
+    for labels in (alike.reshape(-1), visit_numbers(data.readings, data.sources)):
+        kin = components(kin, labels)
     if data.pair is not None:
         _, pair = np.unique(data.pair, return_inverse=True)
-        alone = data.pair == ""
-        kin = _parted(kin, _components(kin, np.where(alone, len(pair) + np.arange(count), pair)))
+        pair = np.where(data.pair == "", len(pair) + np.arange(count), pair)
+        kin, parted = in_stretches(kin, pair, components(kin, pair), data.sources)
     _, first, index = np.unique(kin, return_index=True, return_inverse=True)
-    return np.asarray(first[index.reshape(-1)], dtype=np.int64)
+    return _Kin(np.asarray(first[index.reshape(-1)], dtype=np.int64), parted)
 
 
-def _parted(pose: Rows, linked: Rows) -> Rows:
-    """Labels (n,) of rows that pairs link (n,), of many poses (n,) those of stretches of these."""
-    found, further = linked.copy(), int(linked.max()) + 1
-    for label, count in zip(*np.unique(linked, return_counts=True), strict=True):
-        own = np.flatnonzero(linked == label) if count > LINKED * len(linked) else np.empty(0, np.int64)
-        _, first, number = np.unique(pose[own], return_index=True, return_inverse=True)
-        if len(first) >= 2 * SHORTEST:
-            place = np.argsort(np.argsort(first))[number.reshape(-1)]
-            found[own] = further + place // max(SHORTEST, len(first) // STRETCHES)
-            further = int(found.max()) + 1
-    return found
-
-
-def _on_one_side(data: Measurements, rows: Rows, held: Mask) -> Mask:
-    """Mask (r,) of rows without those of pairs that have one row on either side."""
-    if data.pair is None:
-        return np.ones(len(rows), dtype=np.bool_)
-    pair = data.pair[rows]
-    both = np.intersect1d(pair[held], pair[~held])
-    return ~np.isin(pair, both[both != ""])
-
-
-def _components(a: Rows, b: Rows) -> Rows:
-    """Labels (n,) of rows connected by equal labels in `a` (n,) or in `b` (n,)."""
-    if _all_differ(b):
-        return a
-    if _all_differ(a):
-        return b
-    from scipy.sparse import coo_array  # noqa: PLC0415 - seldom needed, and slow to import
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
-    _, b = np.unique(b, return_inverse=True)
-    nodes = int(a.max()) + 1 + int(b.max()) + 1
-    edges = coo_array((np.ones(len(a)), (a, b + int(a.max()) + 1)), shape=(nodes, nodes))
-    _, labels = connected_components(edges, directed=False)
-    return np.asarray(labels[a], dtype=np.int64)
-
-
-def _all_differ(labels: Rows) -> bool:
-    return len(np.unique(labels)) == len(labels)
+def _drawn_stretches(kin: _Kin, rows: Rows, held: Mask, order: Rows, share: float) -> Mask:
+    """The mask (r,) with the last share of the stretches, in the order (r,) that the rows are permuted to."""
+    parted = np.flatnonzero(kin.parted[rows])
+    _, first, stretch = np.unique(kin.first[rows[parted]], return_index=True, return_inverse=True)
+    permuted = np.argsort(np.argsort(order)[parted[first]])
+    held[parted] = np.isin(stretch.reshape(-1), permuted[_trained(len(first), share) :])
+    return held
 
 
 def _together(held: Mask, rows: Rows, first_of: Rows) -> Mask:
@@ -391,7 +371,9 @@ def _check_sizes(train: int, holdout: int, rule: SplitRule, data: Measurements) 
             rule=""
             if data.pair is None
             else "The two rows of a pair are on one side, and so are few poses that pairs link",
-            way_out="Measure more poses, or hold out another share",
+            way_out="Measure more poses, or hold out another share"
+            if data.pair is None
+            else f"Measure pairs of further poses, or hold out another share. {COMMON_POSE}",
         )
     if rule.train_size is not None and rule.train_size > train:
         raise UsageError(

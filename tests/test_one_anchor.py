@@ -1,0 +1,36 @@
+"""Distances that all go to one fixed point say nothing of errors across the way to it, and it is said so."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.reporting.report import report
+from truearm.simulation import Imperfections, VirtualArm
+
+ARM = VirtualArm(ta.Robot.load("ur5e"), seed=4, imperfections=Imperfections(share=0.0, noise_mm=0.02))
+FAR = np.array([[1.3, -0.4, 0.5], [-0.2, 1.4, 0.3], [0.1, -0.3, 1.6]])
+POSES = 60
+
+
+def measured(anchors):
+    """Distances of poses to fixed points in turn, named by their numbers."""
+    table = ARM.measure_table(ARM.poses(POSES))
+    points = table[["x", "y", "z"]].to_numpy()
+    number = np.arange(POSES) % anchors
+    away = np.linalg.norm(points - points.mean(axis=0) - FAR[number], axis=1)
+    return table.drop(columns=["x", "y", "z"]).assign(distance=away, anchor=[f"wire {k}" for k in number])
+
+
+@pytest.mark.parametrize(("anchors", "told"), [(1, True), (3, False)])
+def test_one_fixed_point_is_told(anchors, told):
+    found = ta.calibrate(ARM.robot, ta.Measurements.from_dataframe(measured(anchors)), model="constant")
+    notices = {notice.kind: notice.message for notice in found.notices}
+    assert ("one_anchor" in notices) == told
+    assert not told or "(wire 0)" in notices["one_anchor"]
+    assert ("one_anchor" in {advice.kind for advice in report(found).advice}) == told
+
+
+def test_two_arms_or_an_arm_that_was_moved_have_a_point_each():
+    table = measured(1).assign(group=np.repeat(["left", "right"], POSES // 2))
+    found = ta.calibrate(ARM.robot, ta.Measurements.from_dataframe(table), model="constant")
+    assert "one_anchor" not in {notice.kind for notice in found.notices}
