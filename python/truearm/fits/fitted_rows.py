@@ -42,8 +42,8 @@ class FittedRows:
             pair once.
         score: Squared standardised residuals over their limit (n,); above one is an outlier.
         distance_m: How far the farthest target of each row is from where the model has it (n,). A distance is
-            off by so much in its row, in both of a pair; those of a calibration are judged by constants that
-            rows far off do not bend, as are their scores.
+            off by so much in its row, in both of a pair. Distances of a calibration, and points that bend its
+            constants, are judged by constants that rows far off do not bend, as are their scores.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
