@@ -45,9 +45,9 @@ class FittedRows:
         distance_m: How far the farthest target of each row is from where the model has it (n,). Of variable
             models it is how far its first target is from where the model without the row has it, if that is
             more: of rows of full weight it mostly is, of outliers, which the model hardly follows, both are
-            the same. A distance is off by so much in its row, in both of a pair. Distances of a calibration, and
-            points that bend its constants, are judged by constants that rows far off do not bend, as are their
-            scores.
+            the same. A distance is off by so much in its row, in both of a pair. Distances of a calibration,
+            and points that bend its constants, are judged by constants that rows far off do not bend, as are
+            their scores.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
