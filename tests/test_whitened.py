@@ -36,5 +36,6 @@ def test_no_more_is_taken_of_rows_than_there_is_of_them(robot, tmp_path):
     found = ta.calibrate(arm.robot, arm.measure(poses_of(arm, 1)), refit=False, holdout=0.1)
     assert found.rows is not None
     seen = Whitened.of(found, found.rows, np.linspace(0.0, 1.0, len(found.rows.weight)))
+    assert seen is not None
     assert np.linalg.eigvalsh(seen.taken).max() < 1.0 + 1e-6
     assert not set(STEP_KINDS) & {notice.kind for notice in found.notices}
