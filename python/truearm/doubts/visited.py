@@ -21,6 +21,8 @@ MOST_TARGETS: Final = MOST_VALUES // (AXES * FEWEST_VISITS)
 """Targets at the most, those that most rows hold, so that enough visits are looked at."""
 LEAST_APART: Final = 1e-6
 """Part of a shot's variance that visits to a pose differ by at the least: rows may be copies of others."""
+SAME: Final = 1e-9
+"""Part of two products below which what joints do not repeat looks as noise does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +84,24 @@ class Visits:
             targets,
         )
 
-    def noise(self, of_row: Floats) -> tuple[Floats, Floats]:
+    def noise(self, of_row: Floats, joints: Floats) -> tuple[Floats, Floats]:
         """Covariance (v m, v m) of the means of shots, ones where not measured, and the variance (v, m) of a
-        single shot, of that of a row of each pose `of_row` (v, m, m) beside what it states.
+        single shot.
 
         The mean of a pose's n shots has the covariance V that the fit took for it: shots share what the arm
         did not repeat and what no model holds. Visits of n_a shots differ by what they are seen to, D / n_a:
         two of one pose have `V - D / n` in common. No prediction tells visits to a pose apart, so that
         whatever D is, as much is left as the fit leaves.
+
+        Args:
+            of_row: Covariance of a row of each pose (v, m, m) beside what it states, as the fit took it.
+            joints: Derivatives by the joint values (v, m, N).
         """
         size = of_row.shape[1]
         unit = np.eye(size)
         own = np.minimum(self.own, np.linalg.eigvalsh(of_row)[:, 0]) + self.stated
         whole = of_row + self.stated[:, None, None] * unit
-        apart, shots = self._apart(whole) * whole, self.of_pose[:, None, None]
+        apart, shots = self._apart(whole, joints), self.of_pose[:, None, None]
         in_common = whole - own[:, None, None] * (1.0 - 1.0 / shots) * unit - apart / shots
         each = np.arange(len(whole))
         noise = np.where(self._same[:, None, :, None], in_common[:, :, None], 0.0)
@@ -109,19 +115,39 @@ class Visits:
         """Which visits (v, v) are to the same pose."""
         return np.asarray(self.pose[:, None] == self.pose)
 
-    def _apart(self, whole: Floats) -> float:
-        """Part of the covariance of a single shot (v, m, m) that visits to a pose are seen to differ by."""
-        _, first, number = np.unique(self.pose, return_index=True, return_inverse=True)
+    def _apart(self, whole: Floats, joints: Floats) -> Floats:
+        """Covariance (v, m, m) of what visits of one shot are seen to differ by from others to their pose.
+
+        It is a part of that of a single shot (v, m, m), and of what joints do not repeat, each as far as the
+        others, carried to the targets; both parts by moments.
+        """
+        _, number, visits = np.unique(self.pose, return_inverse=True, return_counts=True)
         number = number.reshape(-1)
-        freedom = int(self.held.sum()) - int(self.held[first].sum())
-        if not freedom:
-            return 1.0
+        counted = self.weight * (1.0 - 1.0 / visits[number])
+        if not counted.any():
+            return whole
         off = self.residual - means(self.residual, number, self.count)[number]
         both = self.held[:, :, None] & self.held[:, None]
         root = np.linalg.cholesky(np.where(both, whole, np.eye(whole.shape[1])))
         off = np.linalg.solve(root, off[:, :, None])[:, :, 0]
-        squares = float((self.count * self.weight * np.square(off).sum(axis=1)).sum())
-        return max(squares / freedom, LEAST_APART)
+        by = np.linalg.solve(root, joints)
+        squares = self.weight * self.count @ np.square(off).sum(axis=1)
+        of_joints = self.weight * self.count @ np.square(np.einsum("vm,vmj->vj", off, by)).sum(axis=1)
+        values, turned = counted @ self.held.sum(axis=1), counted @ np.square(by).sum(axis=(1, 2))
+        twice = counted @ np.square(by.transpose(0, 2, 1) @ by).sum(axis=(1, 2))
+        of_shot, of_joint = _two_parts((values, turned, twice), (squares, of_joints))
+        return of_shot * whole + of_joint * (joints @ joints.transpose(0, 2, 1))
+
+
+def _two_parts(by: tuple[float, float, float], seen: tuple[float, float]) -> tuple[float, float]:
+    """Factors a and b, none below zero, of `seen = (n a + t b, t a + u b)` with (n, t, u) given in `by`."""
+    values, turned, twice = by
+    left = values * twice - turned**2
+    of_joint = max((values * seen[1] - turned * seen[0]) / left, 0.0) if left > SAME * values * twice else 0.0
+    of_shot = (seen[0] - turned * of_joint) / values
+    if of_shot < LEAST_APART:
+        return LEAST_APART, max(seen[0] - values * LEAST_APART, 0.0) / turned if turned > 0.0 else 0.0
+    return of_shot, of_joint
 
 
 def columns_of(targets: Rows) -> Rows:

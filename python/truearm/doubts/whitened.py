@@ -82,7 +82,7 @@ class Whitened:
         inputs, arm, setup, joints = _derivatives(found, data, held, seen.targets)
         own = setup.reshape(*held.shape, len(found.groups), -1).sum(axis=2)
         of_row = found.spread.noise(arm, np.zeros(size, dtype=np.bool_)) / _scale(found)
-        noise, single = seen.noise(of_row)
+        noise, single = seen.noise(of_row, joints)
         root = np.linalg.cholesky(np.linalg.inv(noise)).T
         weight = np.repeat(seen.weight, size)
         if isinstance(found.spread, ConstantSpread):
