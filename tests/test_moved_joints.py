@@ -10,7 +10,8 @@ import truearm as ta
 from truearm.doubts.at_once import JOINT_MOVED
 from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.doubts.row_order import FEWEST_VISITS
-from truearm.doubts.whitened import MOST_VALUES, Whitened
+from truearm.doubts.visited import MOST_VALUES
+from truearm.doubts.whitened import Whitened
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -101,7 +102,7 @@ def test_what_chance_explains_is_as_likely_as_it_is():
     for _ in range(200):
         noise = rng.normal(size=visits * width)
         left = (noise - taken @ noise).reshape(visits, width)
-        root, shots = np.broadcast_to(np.eye(width), (visits, width, width)), np.ones_like(left)
+        root, shots = np.eye(visits * width), np.ones_like(left)
         nothing = np.zeros((visits, width, 6))
         seen = Whitened(np.arange(visits), left, shots, root, taken, nothing, np.ones_like(left), nothing)
         found.append(seen.explained(rng.normal(size=(visits, width, 6)))[0])
@@ -112,7 +113,7 @@ def test_what_columns_do_is_found_with_its_size():
     rng = np.random.default_rng(3)
     columns, by = rng.normal(size=(50, 3, 2)), np.array([0.5, -1.0])
     noise = 0.1 * rng.normal(size=(50, 3))
-    root, ones = np.broadcast_to(np.eye(3), (50, 3, 3)), np.ones((50, 3))
+    root, ones = np.eye(150), np.ones((50, 3))
     left = columns @ by + noise
     seen = Whitened(np.arange(50), left, ones, root, np.zeros((150, 150)), columns, ones, columns)
     chance, found = seen.explained(columns)
@@ -131,6 +132,7 @@ def test_of_many_targets_on_a_tool_enough_visits_are_looked_at():
     found = ta.calibrate(several.robot, data, model="constant")
     assert found.rows is not None
     seen = Whitened.of(found, found.rows, np.linspace(0.0, 1.0, 40))
+    assert seen is not None
     assert len(seen.rows) >= FEWEST_VISITS
     assert seen.left.size <= MOST_VALUES
     assert np.square(seen.left).sum() == pytest.approx(seen.freedom, rel=0.1)

@@ -546,6 +546,17 @@ class Posterior:
         Inputs, Jacobian and set-up are of all n, as for `covariance`.
         """
 
+    @property
+    def shot_variance(self) -> NDArray[np.float64]:
+        """Variance of what shots of a pose differ by beside what they state, (2,): positions m^2, then
+        orientations rad^2.
+        """
+
+    def first_shots(self, count: int) -> NDArray[np.uint64]:
+        """Of each of `count` places among the residuals (n, m), row by row, the first of those whose mean was
+        fitted, (count,); the place itself where nothing was.
+        """
+
     def repeatability(self, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
         """Covariance (n, m, m) of what joints miss anew at every pose, carried to jacobian (n, m, P)."""
 

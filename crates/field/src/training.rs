@@ -133,6 +133,16 @@ impl Training {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
     }
 
+    /// Of each of so many places among the residuals the first of those whose mean it is a part of, (count,); where there is
+    /// none, the place itself.
+    pub fn first_shots(&self, count: usize) -> Vec<usize> {
+        let mut first: Vec<usize> = (0..count).collect();
+        for shots in &self.source {
+            shots.iter().filter(|&&shot| shot < count).for_each(|&shot| first[shot] = shots[0]);
+        }
+        first
+    }
+
     /// Variance of a row's noise, given the noise that single shots of positions and orientations have; it is not less than
     /// what the shots of poses differ by.
     pub fn noise_variance(&self, row: usize, noise: [f64; 2]) -> f64 {

@@ -448,6 +448,17 @@ impl Posterior {
         Ok(matrix(py, &found, (poses - first) * rows))
     }
 
+    /// Variance of what shots of a pose differ by beside what they state, of positions and of orientations, (2,).
+    #[getter]
+    fn shot_variance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.core().training().shot)
+    }
+
+    /// Of each of `count` places among the residuals the first of those whose mean was fitted, see the stub.
+    fn first_shots<'py>(&self, py: Python<'py>, count: usize) -> Bound<'py, PyArray1<usize>> {
+        self.core().training().first_shots(count).into_pyarray(py)
+    }
+
     /// Covariance (n, m, m) of what joints do not repeat, carried to rows of Jacobians (n, m, P).
     fn repeatability<'py>(
         &self,

@@ -190,11 +190,11 @@ class ConstantSpread:
 
     def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """Covariance (n, m, m), from that of constants and set-up."""
-        rows = self._unknown_to(jacobian, setup)
+        rows = self.unknown_to(jacobian, setup)
         size = rows.shape[2]
         return np.asarray(rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1))
 
-    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
+    def unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
         """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
         rows = jacobian[:, :, self.columns]
         return rows if setup is None else np.concatenate([rows, setup], axis=2)
@@ -205,14 +205,14 @@ class ConstantSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m), from that of constants and set-up."""
-        rows = self._unknown_to(jacobian, setup)
+        rows = self.unknown_to(jacobian, setup)
         size = rows.shape[2]
         rows = rows.reshape(-1, size)
         return np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
 
     def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
         """The block (k m, (n - k) m) of `joint`."""
-        rows = self._unknown_to(jacobian, setup)
+        rows = self.unknown_to(jacobian, setup)
         size = rows.shape[2]
         left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
         return np.asarray(left @ self.of_all[:size, :size] @ right.T)

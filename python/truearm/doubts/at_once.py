@@ -27,6 +27,8 @@ FAINT: Final = 0.01
 """Part of a direction that is left beside what was fitted, below which that imitates it."""
 NOTHING: Final = 1e-9
 """Part of what columns tell by themselves, below which a direction of several is none."""
+NEARLY_NONE: Final = float(np.finfo(np.float64).tiny)
+"""What numbers are divided by at the least, and have a logarithm of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ class Left:
     Attributes:
         pull: Residuals (n,) over their covariance: what columns are multiplied with for their score.
         metric: Inverse covariance (n, n), without what was fitted: what columns tell beside that.
-        alone: The same of noise alone (n, n), of each visit by itself: what they would tell if nothing was.
+        alone: The same of noise alone (n, n): what they would tell if nothing was.
         visit: Number of the visit of each value (n,), ascending.
         square: Sum of squares of the residuals of all set-ups, in units of their variances.
         freedom: Its degrees of freedom.
@@ -117,11 +119,10 @@ def likeliest_step(
         own = list(shape.columns)
         gram_along, alone_along = (along.T @ each[:, own][:, :, own] @ along for each in (gram, alone))
         sizes, squares, ranks = _solved(gram_along, pull[:, own] @ along, alone_along)
-        share = np.clip(squares / np.maximum(left.square - told, squares), 0.0, 1.0)
+        share = squares / np.maximum(np.maximum(left.square - told, squares), NEARLY_NONE)
         free = left.freedom - rank_beside - ranks
         usable = (ranks > 0) & (free > ranks)
-        nothing = np.finfo(np.float64).tiny
-        gain = -0.5 * (free * np.log(np.maximum(1.0 - share, nothing)) + ranks * np.log(left.freedom))
+        gain = -0.5 * (free * np.log(np.maximum(1.0 - share, NEARLY_NONE)) + ranks * np.log(left.freedom))
         gain = np.where(usable, gain, -np.inf)
         k = int(np.argmax(gain))
         if not np.isfinite(gain[k]) or (found is not None and gain[k] <= found.gain):
@@ -149,22 +150,31 @@ def _behind(left: Left, columns: Floats) -> tuple[Floats, Floats, Floats]:
     pull; and what noise alone would tell (v, p, p) of a step there, were only the columns' level fitted.
     """
     starts = np.flatnonzero(np.diff(left.visit, prepend=-1))
-    ends = np.append(starts[1:], len(left.visit))
-    count = columns.shape[1]
-    gram, each = np.empty((2, len(starts), count, count))
-    pull, known = np.empty((len(starts), count)), np.zeros((count, count))
+    pull = _from_there(columns * left.pull[:, None], starts)
+    whole = columns.T @ left.alone @ columns
+    level = _from_there(columns[:, :, None] * (left.alone @ columns)[:, None], starts)
+    told = level @ np.linalg.pinv(whole, hermitian=True) @ level.transpose(0, 2, 1)
+    alone = _products(left.alone, columns, starts) - told
+    alone[0] = whole
+    return _products(left.metric, columns, starts), pull, 0.5 * (alone + alone.transpose(0, 2, 1))
+
+
+def _from_there(values: Floats, starts: Rows) -> Floats:
+    """Sums (v, ...) of values (n, ...) from the first of each visit on."""
+    return np.cumsum(np.add.reduceat(values, starts)[::-1], axis=0)[::-1]
+
+
+def _products(matrix: Floats, columns: Floats, starts: Rows) -> Floats:
+    """Products (v, p, p) over a matrix (n, n) of columns (n, p) that are zero before each visit."""
+    found, known = np.empty((len(starts), *columns.shape[1:] * 2)), np.zeros(columns.shape[1:] * 2)
+    ends = np.append(starts[1:], len(columns))
     for k in reversed(range(len(starts))):
         own, behind = slice(starts[k], ends[k]), slice(ends[k], None)
         here = columns[own]
-        across = here.T @ (left.metric[own, behind] @ columns[behind])
-        known = known + here.T @ left.metric[own, own] @ here + across + across.T
-        gram[k], pull[k] = known, left.pull[own] @ here
-        each[k] = here.T @ left.alone[own, own] @ here
-    pull, later = (np.cumsum(part[::-1], axis=0)[::-1] for part in (pull, each))
-    whole, before = later[0], np.cumsum(each, axis=0) - each
-    alone = later @ np.linalg.pinv(whole, hermitian=True) @ before
-    alone[0] = whole
-    return gram, pull, 0.5 * (alone + alone.transpose(0, 2, 1))
+        across = here.T @ (matrix[own, behind] @ columns[behind])
+        known = known + here.T @ matrix[own, own] @ here + across + across.T
+        found[k] = known
+    return found
 
 
 def _without(

@@ -174,7 +174,7 @@ def slips(found: Calibration, fitted: FittedRows, seen: Whitened, progress: Floa
 def main_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list[Slip]:
     """Those that explain most of what is left, outliers included; arguments as of `slips`."""
     seen = Whitened.of(found, fitted, progress, outliers=True)
-    return [slip for slip in _slips(found, fitted, seen) if slip.share > MOSTLY]
+    return [] if seen is None else [slip for slip in _slips(found, fitted, seen) if slip.share > MOSTLY]
 
 
 def _slips(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Slip]:
@@ -202,26 +202,15 @@ def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Itera
     """Those of a calibration's set-ups."""
     group, width = fitted.data.group[seen.rows], seen.left.shape[1]
     frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS
-    pull = np.einsum("iab,ia->ib", seen.root, seen.left)
-    taken = seen.taken.reshape(len(group), width, len(group), width)
+    pull, alone = seen.root.T @ seen.left.ravel(), seen.precision
+    metric = alone - seen.root.T @ seen.taken @ seen.root
     for name in found.groups:
-        own = np.flatnonzero(group == name)
-        if len(own) < 2 * BESIDE:
+        own, values = group == name, np.flatnonzero(np.repeat(group == name, width))
+        count = len(values)
+        if count < 2 * BESIDE * width:
             continue
-        root, count = seen.root[own], len(own) * width
-        blocks = np.zeros((len(own), width, len(own), width))
-        blocks[np.arange(len(own)), :, np.arange(len(own))] = root.transpose(0, 2, 1) @ root
-        alone = blocks.reshape(count, count)
-        known = np.einsum("iba,ibjc,jcd->iajd", root, taken[own][:, :, own], root, optimize=True)
-        visit = np.repeat(np.arange(len(own)), width)
-        left = Left(
-            pull[own].ravel(),
-            alone - known.reshape(count, count),
-            alone,
-            visit,
-            seen.square,
-            seen.freedom,
-        )
+        both, visit = np.ix_(values, values), np.arange(count) // width
+        left = Left(pull[values], metric[both], alone[both], visit, seen.square, seen.freedom)
         by_readings = seen.joints[own] @ found.robot.coupling
         setup, joints = (each.reshape(count, -1) for each in (seen.setup[own], by_readings))
         points = np.ones(count, dtype=np.bool_)

@@ -22,7 +22,10 @@ def tool_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list
     """
     targets = len(found.selection.targets)
     frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS
-    seen = middles(Whitened.of(found, fitted, progress), frame, targets)
+    seen = Whitened.of(found, fitted, progress)
+    if seen is None:
+        return []
+    seen = middles(seen, frame, targets)
     of_one = replace(found, selection=replace(found.selection, targets=found.selection.targets[:1]))
     sessions = [Tool(**vars(session), targets=targets) for session in sessions_of(of_one, fitted, seen)]
     return [slip for slip in slips_of(sessions) if slip.notice.kind == TARGET_SLIPPED]
@@ -54,19 +57,18 @@ def middles(seen: Whitened, frame: int, targets: int) -> Whitened:
     held = seen.held.reshape(len(seen.rows), -1, AXES)[:, :, 0].astype(np.float64)
     share = held / held.sum(axis=1, keepdims=True)
     middle = np.einsum("vt,ij->vitj", share, np.eye(AXES)).reshape(len(held), AXES, -1)
-    back = middle @ np.linalg.inv(seen.root)
-    root = np.linalg.cholesky(np.linalg.inv(back @ back.transpose(0, 2, 1))).transpose(0, 2, 1)
-    whitened, size = root @ back, AXES * len(held)
-    taken = seen.taken.reshape(*seen.left.shape, *seen.left.shape)
-    taken = np.einsum("via,vawb,wjb->viwj", whitened, taken, whitened, optimize=True).reshape(size, size)
+    size, back = AXES * len(held), np.linalg.inv(seen.root).reshape(*seen.left.shape, -1)
+    back = (middle @ back).reshape(size, -1)
+    root = np.linalg.cholesky(np.linalg.inv(back @ back.T)).T
+    whitened = root @ back
     own, end = middle @ seen.setup, frame + AXES * targets
     alike = own[:, :, frame:end].reshape(len(held), AXES, targets, AXES).sum(axis=2)
     return Whitened(
         rows=seen.rows,
-        left=np.einsum("via,va->vi", whitened, seen.left),
+        left=(whitened @ seen.left.ravel()).reshape(len(held), AXES),
         shots=np.repeat(seen.shots.max(axis=1)[:, None], AXES, axis=1),
         root=root,
-        taken=taken,
+        taken=whitened @ seen.taken @ whitened.T,
         joints=middle @ seen.joints,
         single=np.einsum("via,va->vi", middle, seen.single),
         setup=np.concatenate([own[:, :, :frame], alike, own[:, :, end:]], axis=2),

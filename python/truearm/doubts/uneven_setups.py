@@ -101,8 +101,9 @@ def _scattering(fitted: FittedRows, seen: Whitened, name: str, own: Mask) -> Sca
     held = seen.held[own]
     kept = np.maximum(seen.kept[own][held], LEAST_KEPT)
     deviation = float(np.median(np.abs(seen.left[own][held]) / np.sqrt(kept))) / QUARTILE
-    of_visit = float(np.median(np.square(np.linalg.inv(seen.root[own])).sum(axis=2)[held]))
-    shots, single = (float(np.median(each[own][held])) for each in (seen.shots, seen.single))
+    of_visit, shots, single = (
+        float(np.median(each[own][held])) for each in (seen.variance, seen.shots, seen.single)
+    )
     # What the mean of its shots scatters beyond what was expected, each of them has of its own.
     square = max(single + shots * (deviation**2 - 1.0) * of_visit, deviation**2 * of_visit)
     error = ERROR_OF_MEDIAN / np.sqrt(AXES * len(held))

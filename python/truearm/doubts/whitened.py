@@ -9,90 +9,24 @@ import numpy as np
 
 from truearm._core import setup_jacobian
 from truearm.calibration import Calibration
-from truearm.certainty.uncertainty import task_of
-from truearm.doubts.nominal_misfit import some_rows
-from truearm.doubts.row_order import FEWEST_VISITS
-from truearm.fits.core_set import Selection, core_set
+from truearm.certainty.uncertainty import ConstantSpread, task_of
+from truearm.doubts.visited import Visits, columns_of
+from truearm.fits.core_set import core_set
 from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitted_rows import FittedRows
-from truearm.fits.measured_parts import held_parts
 from truearm.fits.models import CONSTANT
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
-from truearm.rows.shots import Scatter
-from truearm.rows.visits import means, visit_numbers
 from truearm.types import AXES, Floats, Mask, Rows
 
-MOST_VALUES: Final = 900
-"""Coordinates at the most that are looked at: they tell enough, and their covariance is quick."""
 TRUSTED: Final = 0.5
 """Rows of a lesser weight are outliers."""
-MOST_TARGETS: Final = MOST_VALUES // (AXES * FEWEST_VISITS)
-"""Targets at the most, those that most rows hold, so that enough visits are looked at."""
 FAINT: Final = 0.01
 """Part of a column that is left beside what was fitted, below which that imitates it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Visits:
-    """Visits to poses, v of them, each with the mean of its shots.
-
-    Attributes:
-        rows: Place of the first row of each among the fitted rows (v,).
-        residual: Mean residual of its shots (v, m), m.
-        shots: How many of them hold it (v, m).
-        stated: Mean of the variances that they state (v,), m^2.
-        own: Variance that each shot has of its own beside, which those of a visit differ by, m^2.
-        targets: Which of the fitted targets are looked at (t,), m = 3 t.
-    """
-
-    rows: Rows
-    residual: Floats
-    shots: Floats
-    stated: Floats
-    own: float
-    targets: Rows
-
-    @classmethod
-    def of(cls, fitted: FittedRows, selection: Selection, progress: Floats, trusted: Mask) -> "Visits":
-        """Those of `trusted` rows (n,), some where they are many, set-up after set-up."""
-        parts = held_parts(fitted.data, selection)[:, :-1]
-        targets = np.sort(np.argsort(-parts[trusted].sum(axis=0), kind="stable")[:MOST_TARGETS])
-        parts = parts[:, targets]
-        _, group = np.unique(fitted.data.group, return_inverse=True)
-        order = np.lexsort((progress, group.reshape(-1)))
-        order = order[(trusted & parts.any(axis=1))[order]]
-        visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
-        held = np.repeat(parts, AXES, axis=1)[order]
-        each = fitted.residual[np.ix_(order, _columns(targets))] * held
-        shots = means(held.astype(np.float64), visits) * np.bincount(visits)[:, None]
-        residual = means(each, visits) * np.bincount(visits)[:, None] / np.maximum(shots, 1.0)
-        stated = means(np.square(fitted.data.stated_sigma_m[order]), visits)
-        further = np.bincount(visits) - 1.0
-        own = Scatter.of(np.where(held, each, np.nan), visits).own
-        own -= float(np.average(stated, weights=further)) if further.any() else 0.0
-        _, first = np.unique(visits, return_index=True)
-        some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
-        rows = order[first[some]]
-        return cls(rows, residual[some], shots[some], stated[some], max(own, 0.0), targets)
-
-    @property
-    def held(self) -> Mask:
-        """What was measured (v, m)."""
-        return np.asarray(self.shots > 0.0)
-
-    def noise(self, of_row: Floats) -> tuple[Floats, Floats]:
-        """Covariance (v, m, m) of the means of shots, ones where not measured, and the variance (v, m) of a
-        single shot, of that of a row `of_row` (v, m, m) beside what it states.
-
-        Shots share what the arm did not repeat and what no model holds.
-        """
-        unit = np.eye(self.shots.shape[1])
-        own = np.minimum(self.own, np.linalg.eigvalsh(of_row)[:, 0])[:, None]
-        differ = own + self.stated[:, None]
-        single = np.diagonal(of_row, axis1=1, axis2=2) + self.stated[:, None]
-        mean = of_row + (differ / np.maximum(self.shots, 1.0) - own)[:, :, None] * unit
-        return np.where(self.held[:, :, None] & self.held[:, None], mean, unit), single
+ROUNDING: Final = 1e-4
+"""Part of its variance by which more may seem to be taken of a residual than there is of it."""
+LEAST_TOLD: Final = 1e-9
+"""Part of what rows tell of the unknown that they tell most of, below which they tell nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +34,15 @@ class Whitened:
     """Residuals of v visits to poses, and what the fit has taken of them.
 
     Residuals r of a fit with noise of covariance R, whose predictions have the posterior covariance S at the
-    rows, have the covariance R - S. They are looked at as z = R^(-1/2) r, with the covariance I - T.
+    rows, have the covariance R - S. They are looked at as z = R^(-1/2) r, with the covariance I - T. Visits
+    to one pose have part of their noise in common, as in the fit, and each its place in time.
 
     Attributes:
         rows: Place of the first row of each visit among the fitted rows (v,), set-up after set-up, each in
             the order of measuring.
         left: z, of positions (v, m), three for each target; zero where not measured.
         shots: How many shots of the visit hold it (v, m); zero where not measured.
-        root: R^(-1/2) of each visit (v, m, m).
+        root: R^(-1/2) (v m, v m), upper triangular, without anything between set-ups.
         taken: T (v m, v m).
         joints: Derivatives (v, m, N) by the joint values, not their readings, base frame; zero where not
             measured.
@@ -127,8 +62,11 @@ class Whitened:
     @classmethod
     def of(
         cls, found: Calibration, fitted: FittedRows, progress: Floats, *, outliers: bool = False
-    ) -> "Whitened":
-        """Those of a calibration from positions, of rows that it was fitted to.
+    ) -> "Whitened | None":
+        """Those of a calibration from positions, of rows that it was fitted to; None where more was taken of
+        them than there is, by a fit that knew of another noise: nothing can be told there.
+
+        Noise and posterior are as the fit took them, without the factors on standard deviations.
 
         Args:
             found: The calibration, of constants or of what varies.
@@ -138,22 +76,36 @@ class Whitened:
         """
         # What varies is without its outliers; constants keep them, and are looked at by medians.
         trusted = (fitted.weight >= TRUSTED) | (found.variable is None) | outliers
-        seen = Visits.of(fitted, found.selection, progress, trusted)
-        rows, held = seen.rows, seen.held
-        data = fitted.fitted.select(rows)
+        seen = Visits.of(found, fitted, progress, trusted)
+        held, data = seen.held, fitted.fitted.select(seen.pose)
+        size = held.shape[1]
         inputs, arm, setup, joints = _derivatives(found, data, held, seen.targets)
         own = setup.reshape(*held.shape, len(found.groups), -1).sum(axis=2)
-        size = held.shape[1]
-        noise, single = seen.noise(found.spread.noise(arm, np.zeros(size, dtype=np.bool_)))
-        root = np.linalg.cholesky(np.linalg.inv(noise)).transpose(0, 2, 1)
-        known = found.spread.joint(inputs, arm, setup) / _widened(found) ** 2
-        known = known.reshape(len(data), size, len(data), size)
-        # A fit takes as much less of a row as it gives it less weight.
-        counted = root * np.sqrt(fitted.weight[rows])[:, None, None]
-        known = np.einsum("iab,ibkc->iakc", counted, known)
-        taken = np.einsum("iakc,kdc->iakd", known, counted).reshape(held.size, held.size)
-        left = np.einsum("iab,ib->ia", root, seen.residual)
-        return cls(rows, left, seen.shots, root, taken, joints, single, own)
+        of_row = found.spread.noise(arm, np.zeros(size, dtype=np.bool_)) / _scale(found)
+        noise, single = seen.noise(of_row, joints)
+        root = np.linalg.cholesky(np.linalg.inv(noise)).T
+        weight = np.repeat(seen.weight, size)
+        if isinstance(found.spread, ConstantSpread):
+            rows = found.spread.unknown_to(arm, setup).reshape(held.size, -1)
+            taken, residual = _fitted_again(root, weight, seen.residual.ravel(), rows)
+        else:
+            known = found.spread.joint(inputs, arm, setup) / (_scale(found) * _beyond(found))
+            known, residual = _in_full(noise, weight, seen.residual.ravel(), known)
+            taken = root @ known @ root.T
+        if np.linalg.eigvalsh(taken)[-1] > 1.0 + ROUNDING:
+            return None
+        left = (root @ residual).reshape(held.shape)
+        return cls(seen.rows, left, seen.count[:, None] * held, root, taken, joints, single, own)
+
+    @property
+    def precision(self) -> Floats:
+        """R^-1 (v m, v m)."""
+        return np.asarray(self.root.T @ self.root)
+
+    @property
+    def variance(self) -> Floats:
+        """Variances (v, m) of the means of shots, m^2: the diagonal of R."""
+        return np.asarray(np.square(np.linalg.inv(self.root)).sum(axis=1).reshape(self.left.shape))
 
     @property
     def held(self) -> Mask:
@@ -178,13 +130,8 @@ class Whitened:
         count that.
         """
         left = self.left.ravel()
-        try:
-            factor = np.linalg.cholesky(np.eye(len(left)) - (1.0 - FAINT) * self.taken)
-            return float(np.square(np.linalg.solve(factor, left)).sum())
-        except np.linalg.LinAlgError:
-            # Of rows that it gives little weight a fit may seem to take more than all.
-            taken, directions = np.linalg.eigh(self.taken)
-            return float((np.square(directions.T @ left) / np.maximum(1.0 - taken, FAINT)).sum())
+        factor = np.linalg.cholesky(np.eye(len(left)) - (1.0 - FAINT) * self.taken)
+        return float(np.square(np.linalg.solve(factor, left)).sum())
 
     def explained(self, columns: Floats) -> tuple[float, Floats]:
         """How well so many columns (v, m, k) explain what is left, in metres per unit of each.
@@ -197,7 +144,7 @@ class Whitened:
         """
         from scipy.special import betaincc  # noqa: PLC0415 - slow to import
 
-        whitened = np.einsum("iab,ibk->iak", self.root, columns).reshape(self.left.size, -1)
+        whitened = self.root @ columns.reshape(self.left.size, -1)
         size = np.linalg.norm(whitened, axis=0)
         whitened /= np.where(size > 0.0, size, 1.0)
         known, directions = np.linalg.eigh(whitened.T @ whitened - whitened.T @ self.taken @ whitened)
@@ -211,14 +158,51 @@ class Whitened:
         return float(betaincc(0.5 * rank, 0.5 * free, min(share, 1.0))), found
 
 
-def _widened(found: Calibration) -> float:
-    """Factor on standard deviations that is meant for where nothing was measured."""
-    return 1.0 if found.variable is None else found.variable.hyper["extrapolation"][0]
+def _in_full(noise: Floats, weight: Floats, residual: Floats, known: Floats) -> tuple[Floats, Floats]:
+    """Posterior (n, n) and residuals (n,) where all values count in full, of a fit that gave some less.
+
+    What their weight (n,) lacks of a value's precision is a further measurement of it. Else what the fit did
+    without would be held against what it made of the rest, and the rest would tell nothing of it.
+    """
+    less = np.flatnonzero(weight < 1.0)
+    if not len(less):
+        return known, residual
+    lacking = np.sqrt(1.0 - weight[less])
+    both = np.ix_(less, less)
+    gain = np.linalg.solve(known[both] + noise[both] / (lacking[:, None] * lacking), known[less]).T
+    return known - gain @ known[less], residual - gain @ residual[less]
 
 
-def _columns(targets: Rows) -> Rows:
-    """Columns of residuals, three a fitted target, of some of these (t,)."""
-    return np.asarray((AXES * targets[:, None] + np.arange(AXES)).ravel())
+def _fitted_again(root: Floats, weight: Floats, residual: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """What a fit of constants takes by derivatives (n, u), in units of noise (n, n), and the residuals (n,).
+
+    They were fitted to all rows as if noise were of each value by itself. So much of it as poses, and targets
+    of one pose, have in common they count right here, as generalised least squares do.
+
+    Args:
+        root: Root (n, n) of the inverse covariance of the noise.
+        weight: Weights of the values in the fit (n,).
+        residual: What it left of them (n,).
+        rows: The derivatives by what was fitted (n, u).
+    """
+    size = np.linalg.norm(rows, axis=0)
+    rows = rows[:, size > 0.0] / size[size > 0.0]
+    counted = root * np.sqrt(weight)
+    directions, told, back = np.linalg.svd(counted @ rows, full_matrices=False)
+    is_told = told > LEAST_TOLD * told.max(initial=0.0)
+    directions, told, back = directions[:, is_told], told[is_told], back[is_told]
+    step = back.T @ (directions.T @ (counted @ residual) / told)
+    return directions @ directions.T, residual - rows @ step
+
+
+def _scale(found: Calibration) -> float:
+    """Factor on variances of a spread by which what was left surpassed what the fit took for noise."""
+    return 1.0 if found.variable is None else found.variable.inflation**2
+
+
+def _beyond(found: Calibration) -> float:
+    """Factor on variances that is meant for where nothing was measured."""
+    return 1.0 if found.variable is None else found.variable.hyper["extrapolation"][0] ** 2
 
 
 def _derivatives(
@@ -235,7 +219,7 @@ def _derivatives(
     parameters = np.ascontiguousarray(point.parameters(inputs))
     joints = np.ascontiguousarray(inputs[:, : task.arm.robot.joint_count])
     problem = task.problem(core_set(task.arm.robot, data, task.selection, task.groups), [])
-    own = setup_jacobian(problem, parameters, setup)[:, _columns(targets)]
+    own = setup_jacobian(problem, parameters, setup)[:, columns_of(targets)]
     by_setup = np.zeros((*held.shape, setup_unknowns(task)))
     by_arm = np.zeros((*held.shape, task.arm.table.size))
     width = own.shape[2]

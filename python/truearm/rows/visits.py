@@ -42,8 +42,12 @@ def visit_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
         readings: (n, N), rad or m.
         kin: File or set-up of each row (n,); a visit is within one.
     """
-    changes = np.diff(pose_numbers(readings, kin), prepend=-1) != 0
-    return np.asarray(np.cumsum(changes) - 1, dtype=np.int64)
+    return visits_of(pose_numbers(readings, kin))
+
+
+def visits_of(poses: Rows) -> Rows:
+    """Number of each row's visit (n,), from the numbers of the rows' poses (n,) in the order of measuring."""
+    return np.asarray(np.cumsum(np.diff(poses, prepend=-1) != 0) - 1, dtype=np.int64)
 
 
 def means(values: Floats, visits: Rows, weight: Floats | None = None) -> Floats:

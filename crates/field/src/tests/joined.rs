@@ -37,6 +37,9 @@ fn shots_are_joined_to_their_mean() {
             assert_eq!(found.source[row].len(), 4);
         }
     }
+    let first = found.first_shots(all.row_count() + 1);
+    assert_eq!(first[12..24], (12..24).map(|place| 12 + place % 3).collect::<Vec<usize>>());
+    assert_eq!(first.last(), Some(&all.row_count()));
     // 30 x 3 x 3 differences know the shots' variance to 9 %; it is the smallest that is still plausible that is taken.
     let share = found.shot[0] / 1e-10;
     assert!((0.6..1.05).contains(&share), "{share}");
