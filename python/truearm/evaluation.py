@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -141,6 +141,20 @@ class Evaluation:
         return {**{name: getattr(self, name) for name in counts}, "errors": errors}
 
 
+class _Gross(NamedTuple):
+    """Notices of rows.
+
+    Attributes:
+        spoiled: Of those that spoil frame and tool.
+        doubts: Of gross ones among those that were judged, and of what frame and tool add to all.
+        changed: That the arm is not as it was calibrated.
+    """
+
+    spoiled: list[Notice]
+    doubts: list[Notice]
+    changed: list[Notice]
+
+
 def evaluate(
     calibration: Calibration,
     data: Measurements | Sequence[Measurements],
@@ -194,18 +208,29 @@ def evaluate(
         errors = judge(task, models, chosen_rows, found_by)
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
-        spoiled, doubts, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
-    of_no_use = spoiled or _of_no_use(calibration, held, changed) or changed
-    if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
-        of_no_use = _moved(calibration, given, chosen, held.median_mm(best)) or of_no_use
-    told = (
-        of_no_use if spoiled or not changed else _with_slips(calibration, given, (chosen, stages), of_no_use)
-    )
-    notices = [*notices, *told, *doubts]
+        gross = _gross(task, calibration, models[best], found_by, rows, chosen)
+    notices += [*_warnings(calibration, given, (chosen, stages), held, gross), *gross.doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
     counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
     return Evaluation(*counts, statistics, tuple(notices), held, _finds(task, chosen))
+
+
+def _warnings(
+    calibration: Calibration,
+    data: Measurements,
+    how: tuple[EvaluationOptions, Stages],
+    held: HeldRows,
+    gross: _Gross,
+) -> list[Notice]:
+    """What makes the calibration of no use, and what is not as it was when it was made."""
+    if gross.spoiled:
+        return gross.spoiled
+    options, _ = how
+    told = _of_no_use(calibration, held, gross.changed) or gross.changed
+    if told and (options.keep_frames or options.keep_tool):
+        told = _moved(calibration, data, options, held.median_mm(calibration.model_name)) or told
+    return _with_slips(calibration, data, how, told) if gross.changed else told
 
 
 def _with_slips(
@@ -359,9 +384,8 @@ def _gross(
     frame: Measurements,
     held: tuple[Measurements, HeldRows],
     options: EvaluationOptions,
-) -> tuple[list[Notice], list[Notice], list[Notice]]:
-    """Notices of rows that spoil frame and tool, of gross ones among those that were judged and of what frame
-    and tool add to all, and that the arm is not as it was calibrated.
+) -> _Gross:
+    """What is told of rows and what they were found by.
 
     Where frame and tool are found, a robust fit says where the first of them belong.
     """
@@ -377,9 +401,10 @@ def _gross(
         of_frame = replace(of_frame, model=replace(model, setup=setup))
     spoiled = gross_frame_rows(of_frame)
     if options.keep_frames or spoiled:
-        return spoiled, outliers, changed
+        return _Gross(spoiled, outliers, changed)
     found = FoundSetUps(task, model, frame, options.keep_tool, _lever_m(calibration))
-    return spoiled, [*outliers, *found.notices(held[0], held[1].errors[calibration.model_name])], changed
+    added = found.notices(held[0], held[1].errors[calibration.model_name])
+    return _Gross(spoiled, [*outliers, *added], changed)
 
 
 def _lever_m(calibration: Calibration) -> float:

@@ -136,7 +136,7 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
         found, rows = _of_constants(task, found, rows, robust)
     seen = Whitened.of(found, rows, progress)
     if seen is None:
-        return [slip.notice for slip in _slips_by_constants(task, found, rows, progress)]
+        return [*bent, *(slip.notice for slip in _slips_by_constants(task, found, rows, progress))]
     slipped = slips(found, rows, seen, progress) or _slips_by_constants(task, found, rows, progress)
     return [*bent, *uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
 
