@@ -129,7 +129,7 @@ class Visits:
         off = self.residual - means(self.residual, number, self.count)[number]
         both = self.held[:, :, None] & self.held[:, None]
         root = np.linalg.cholesky(np.where(both, whole, np.eye(whole.shape[1])))
-        off = np.linalg.solve(root, off[:, :, None])[:, :, 0]
+        off = np.asarray(np.linalg.solve(root, off[:, :, None])[:, :, 0], dtype=np.float64)
         by = np.linalg.solve(root, joints)
         squares = self.weight * self.count @ np.square(off).sum(axis=1)
         of_joints = self.weight * self.count @ np.square(np.einsum("vm,vmj->vj", off, by)).sum(axis=1)
