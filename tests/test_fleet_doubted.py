@@ -76,3 +76,14 @@ def test_an_open_set_up_is_grave_where_other_poses_would_close_it(folder, name, 
 def test_arms_that_keep_a_direction_of_the_flange_are_known():
     robots = {name: ta.Robot.load(name) for name in ("adept-cobra-600", "ur10", "kuka-iiwa-7")}
     assert [name for name, robot in robots.items() if never_turns_freely(robot)] == ["adept-cobra-600"]
+
+
+def test_constants_that_gross_rows_bend_are_grave():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
+    table = arm.measure_table(arm.poses(POSES))
+    assert (
+        grave_notices(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")) == []
+    )
+    table.loc[[3, 17, 40], "x"] += 0.02
+    bent = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    assert any("bend the constants" in words for words in grave_notices(bent))

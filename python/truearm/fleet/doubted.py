@@ -6,11 +6,12 @@ from truearm.calibrating import REFIT_ASTRAY
 from truearm.calibration import Calibration
 from truearm.doubts.few_judged import UNDECIDED
 from truearm.doubts.held_tool import never_turns_freely
+from truearm.doubts.masked_rows import BENT
 from truearm.doubts.of_calibration import OPEN_SETUP
 from truearm.doubts.of_results import COMPUTED, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, SINGLE_ROWS, WOULD_FIT
 
-GRAVE: Final = (COMPUTED, SINGLE_ROWS, *WOULD_FIT, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, REFIT_ASTRAY)
-"""Data or table are wrong, or of another arm."""
+GRAVE: Final = (COMPUTED, SINGLE_ROWS, BENT, *WOULD_FIT, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, REFIT_ASTRAY)
+"""Data or table are wrong, or of another arm, or what is wrong of them bends the calibration."""
 
 
 def grave_notices(calibration: Calibration) -> list[str]:
