@@ -553,8 +553,8 @@ class Posterior:
         """
 
     def first_shots(self, count: int) -> NDArray[np.uint64]:
-        """Of each of `count` places among the residuals (n, m), row by row, the first of those whose mean was
-        fitted, (count,); the place itself where nothing was.
+        """For each of the first `count` residuals (n, m), counted row by row, the place of the first one that
+        was averaged with it, (count,); its own where none was.
         """
 
     def repeatability(self, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:

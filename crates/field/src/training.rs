@@ -133,8 +133,8 @@ impl Training {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
     }
 
-    /// Of each of so many places among the residuals the first of those whose mean it is a part of, (count,); where there is
-    /// none, the place itself.
+    /// For each of the first `count` residuals the place of the first one that was averaged with it; its own where none
+    /// was.
     pub fn first_shots(&self, count: usize) -> Vec<usize> {
         let mut first: Vec<usize> = (0..count).collect();
         for shots in &self.source {

@@ -454,7 +454,7 @@ impl Posterior {
         vector(py, &self.core().training().shot)
     }
 
-    /// Of each of `count` places among the residuals the first of those whose mean was fitted, see the stub.
+    /// For each of the first `count` residuals the place of the first one that was averaged with it, see the stub.
     fn first_shots<'py>(&self, py: Python<'py>, count: usize) -> Bound<'py, PyArray1<usize>> {
         self.core().training().first_shots(count).into_pyarray(py)
     }
