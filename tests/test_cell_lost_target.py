@@ -51,8 +51,12 @@ def test_a_fault_that_the_lines_cannot_tell_is_refused(nothing):
 
 def test_a_target_that_is_missed_now_and_then_costs_attempts(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # A tracker that streams draws anew each run: 50 attempts leave one pose in 1e15 without a valid reading.
     text = cell_text(
-        "tracker", sensor={"average": 1}, simulate={"faults": {"missed": 0.3}}, process={"check_every": 0}
+        "tracker",
+        sensor={"average": 1},
+        simulate={"faults": {"missed": 0.5}},
+        process={"check_every": 0, "attempts": 50},
     )
     assert measure(text, 18) == 0
     found = summary()
