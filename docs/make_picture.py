@@ -5,6 +5,7 @@ the truth.
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from truearm.simulation import Imperfections, VirtualArm
 PAGE = Path(__file__).parent / "picture.svg"
 MEASURED, ON_PATH, SEED = 400, 200, 2
 PATH_DEG = ([60.0, 60.0, -35.0, 0.0, 0.0], [125.0, 90.0, -10.0, 0.0, 0.0])
-SHARE = 0.3
+ERRING = Imperfections(share=0.3, non_geometric="joint")
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 720, 300, 56, 44, 16, 120
 COLOURS = {"nominal": "#8a8f98", "constant": "#d98324", "variable": "#1f6fb2"}
 
@@ -29,10 +30,10 @@ def main() -> int:
 
 def errors_on_path() -> dict[str, np.ndarray]:
     """Distance between prediction and truth of the measured target for each model, mm, (ON_PATH,)."""
-    arm = VirtualArm.paper(seed=SEED, imperfections=Imperfections(share=SHARE))
+    arm = VirtualArm.paper(seed=SEED, imperfections=ERRING)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(MEASURED)))
     path = np.radians(np.linspace(*PATH_DEG, ON_PATH))
-    quiet = VirtualArm.paper(seed=SEED, imperfections=Imperfections(share=SHARE, noise_mm=0.0))
+    quiet = VirtualArm.paper(seed=SEED, imperfections=replace(ERRING, noise_mm=0.0))
     truth = quiet.measure(path).targets[:, 0]
     joints = arm.robot.joints_from_readings(path)
     errors = {}
