@@ -15,5 +15,5 @@ for count in (25, 50, 150):
     means = [errors[model].position.mean for model in ("nominal", "constant", "variable")]
     print(f"{count:5d}  {means[0]:10.3f}  {means[1]:11.3f}  {means[2]:11.3f}")
 
-# %% The instrument's noise is in all of these: 0.04 mm in each coordinate, 0.064 mm in the mean of the distance.
+# %% The instrument's noise is in all of these: 0.04 mm in each coordinate, 0.064 mm in the mean distance.
 # More poses leave less of what varies; of an arm on which nothing does, they make the two models level.

@@ -46,8 +46,8 @@ def command(
 
     The arm, the x-y-z table and the touch panel are virtual, processes of their own behind pseudo-terminals;
     all else is as with real ones. The arm's Denavit-Hartenberg parameters are off by 0.4 mm and 0.05 deg, and
-    its first joints err by the harmonics of the paper's equation (6). Takes about a minute; interrupted, the same command
-    goes on with the measurements that it has.
+    its first joints err by the harmonics of the paper's equation (6). Takes about a minute; interrupted, the
+    same command goes on with the measurements that it has.
 
     Examples:
       truearm demo

@@ -21,8 +21,7 @@ from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 EXAMPLE: Final = "rv-m2"
 ERRING: Final = {"share": 0.3, "non_geometric": "joint"}
-"""How its arm errs beside its geometry: by its joints, as measured arms do. Of those constant parameters leave
-a third to a half."""
+"""How its arm errs beside its geometry: by its joints, as measured arms do."""
 PATH_POINTS: Final = 60
 NEARER: Final = 0.9
 
