@@ -34,12 +34,6 @@ Programming: TypeAlias = Annotated[
 Language: TypeAlias = Annotated[
     str | None, typer.Option(metavar="NAME", help="Language.  [default: by the ending]")
 ]
-Task: TypeAlias = Annotated[
-    str, typer.Option(metavar="pose|axis|position", help="What of the tool is to be met.")
-]
-Moving: TypeAlias = Annotated[
-    str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
-]
 OnRefusal: TypeAlias = Annotated[
     str,
     typer.Option(metavar="stop|keep-nominal", help="What becomes of targets that cannot be corrected."),
