@@ -33,7 +33,10 @@ CalibFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
 ]
 MeasurementFiles: TypeAlias = Annotated[
-    list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
+    list[Path],
+    typer.Argument(
+        metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own, or with a column group."
+    ),
 ]
 CellFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="CELL", help="A cell file: arm, devices and their ports.")

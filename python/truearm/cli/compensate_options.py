@@ -50,8 +50,7 @@ LeastSpacingMm: TypeAlias = Annotated[
     typer.Option(
         "--least-spacing-mm",
         metavar="MM",
-        help="Least way between inserted waypoints.",
-        show_default=f"{LEAST_SPACING_MM:g}",
+        help=f"Least way between inserted waypoints.  [default: {LEAST_SPACING_MM:g}]",
     ),
 ]
 OffsetsMm: TypeAlias = Annotated[
