@@ -59,7 +59,7 @@ OffsetsMm: TypeAlias = Annotated[
         "--offsets-mm",
         metavar="MM",
         help="Change targets that are used with offsets too, where the tool's point stays within this there; "
-        "its turn is told, not bounded.",
+        "its turn is reported, not bounded.",
     ),
 ]
 DryRun: TypeAlias = Annotated[

@@ -189,7 +189,7 @@ def unknown_tool_notices(done: Rewritten, moving: int) -> list[Notice]:
         return []
     text = (
         f"{unknown[0]}: {moving} joints meet the position of one point first, and that of the robot file's "
-        "tool was taken. The program's own may miss by more than is told. Give its place: --frames FILE"
+        "tool was taken. The program's own may miss by more than is reported. Give its place: --frames FILE"
     )
     return [Notice("tool_unknown", text)]
 
