@@ -90,10 +90,15 @@ def _members(kind: type) -> Iterator[tuple[str, str, Any]]:
             continue
         function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
         if inspect.isfunction(function):
-            before = kind.__name__ if function is not member else kind.__name__.lower()
+            before = kind.__name__ if function is not member else instance_of(kind.__name__)
             yield name, _call(f"{before}.{name}", function), function
         elif hasattr(member, "__get__") and not isinstance(member, Kept):
             yield name, "", member
+
+
+def instance_of(kind: str) -> str:
+    """What an instance of a class is called in calls: `CalibrationOptions` is `calibration_options`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind).lower()
 
 
 def _call(name: str, thing: Any) -> str:

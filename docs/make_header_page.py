@@ -61,7 +61,7 @@ def name_of(declaration: str) -> str:
 
 def words(comment: str) -> str:
     """A comment as a paragraph of the page; what it says of safety is what the caller has to see to."""
-    return comment.replace("# Safety\n", "The caller sees to it that: ").replace("\n\n\n", "\n\n")
+    return comment.replace("# Safety\n", "The caller ensures that ").replace("\n\n\n", "\n\n")
 
 
 if __name__ == "__main__":

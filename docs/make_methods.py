@@ -73,8 +73,8 @@ whole poses now.
 BEHIND = """The table has the means that are more than 3 % above the lowest of the others, from 100 training
 poses on.
 """
-ALONE = """Medians hide single runs. These are as far behind, on the same sizes:
-"""
+ALONE = "Medians hide single runs: {} of {} are as far behind, on the same sizes ([list]({}))."
+RUNS = "Runs in which ours is behind"
 WHY = """What we know of the causes. Where the tail of one of the first three joints of the UR10 is left
 out, a quarter to three quarters of our error there, a half in the median, is one curve of that
 joint over readings that nothing has measured, which a method can only guess
@@ -102,14 +102,17 @@ def main() -> int:
         sys.stdout.write(f"section replaced in {PAGE}\n")
         return 0
     PICTURE.write_text(leaner((study / "learning_curves.svg").read_text()))
+    standing, others = parted(sections(summary))
     parts = [
         HEAD,
         runs_of(summary),
         KNOWN,
         f"![Mean held-out error over training poses]({PICTURE.name})",
+        *standing,
         "## Where ours is behind",
         behind(summary),
-        *sections(summary),
+        *others,
+        *list_of_runs(summary),
     ]
     PAGE.write_text("\n\n".join(part.strip("\n") for part in parts) + "\n")
     sys.stdout.write(f"written to {PAGE}\n")
@@ -197,26 +200,44 @@ def behind(summary: Mapping[str, Any]) -> str:
     ]
     header = ("set", "split", "poses", "ours", "best", "which is")
     first = f"{BEHIND}\n{table(header, rows)}" if rows else AHEAD
-    runs = runs_behind(summary["results"], summary["methods"])
-    alone = f"{ALONE}\n{table(('set', 'split', *header[2:]), runs)}" if runs else ""
+    runs, of = runs_behind(summary["results"], summary["methods"])
+    alone = ALONE.format(len(runs), of, f"#{RUNS.lower().replace(' ', '-')}") if runs else ""
     return "\n\n".join(part.strip("\n") for part in (first, alone, WHY if runs else "") if part)
 
 
-def runs_behind(results: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> list[tuple[str, ...]]:
-    """The runs in which another of the methods is better by more than 3 %."""
+def parted(parts: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
+    """The first section, and all others."""
+    heads = [place for place, part in enumerate(parts) if part.startswith("## ")]
+    return parts[: heads[1]], parts[heads[1] :]
+
+
+def list_of_runs(summary: Mapping[str, Any]) -> list[str]:
+    """The section with the runs in which ours is behind; nothing where there is none."""
+    runs, _ = runs_behind(summary["results"], summary["methods"])
+    header = ("set", "split", "poses", "seed", "ours", "best", "which is")
+    return [f"## {RUNS}", table(header, runs)] if runs else []
+
+
+def runs_behind(
+    results: Sequence[Mapping[str, Any]], methods: Sequence[str]
+) -> tuple[list[tuple[str, ...]], int]:
+    """The runs in which another of the methods is better by more than 3 %, and of how many."""
     runs: dict[tuple[Any, ...], dict[str, float]] = {}
     for result in results:
         if "errors" in result and result["n_train"] >= FEWEST and result["method"] in methods:
             run = tuple(result[key] for key in ("set", "split", "detail", "size", "seed"))
             runs.setdefault(run, {})[result["method"]] = result["errors"]["mean_mm"]
-    rows = []
-    for (name, split, detail, size, _seed), means in runs.items():
+    rows, compared = [], 0
+    for (name, split, detail, size, seed), means in runs.items():
         ours = means.pop("ours", None)
         best = min(means, key=lambda method: means[method], default=None)
-        if ours is not None and best is not None and ours > LEVEL * means[best]:
+        if ours is None or best is None:
+            continue
+        compared += 1
+        if ours > LEVEL * means[best]:
             words = f"{SPLITS[split]} {detail}".strip()
-            rows.append((name, words, size, f"{ours:.3f}", f"{means[best]:.3f}", TITLES[best]))
-    return sorted(rows)
+            rows.append((name, words, size, str(seed), f"{ours:.3f}", f"{means[best]:.3f}", TITLES[best]))
+    return sorted(rows), compared
 
 
 if __name__ == "__main__":

@@ -204,7 +204,11 @@ def test_links_lead_somewhere(page):
 
 def anchors_of(page):
     headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return {anchor_of(heading) for heading in headings}
+
+
+def anchor_of(heading):
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def test_every_page_is_reached_from_the_index():
@@ -329,6 +333,23 @@ def test_a_section_of_the_comparison_is_replaced_alone(monkeypatch):
     assert "dear" not in changed
     with pytest.raises(SystemExit, match='must both have a section "End"'):
         maker.with_section(page, summary, "End")
+
+
+def test_single_runs_that_are_behind_are_listed_last_with_their_seed():
+    maker = load_script("make_methods")
+    assert maker.parted(["## A", "text", "## B", "more"]) == (["## A", "text"], ["## B", "more"])
+    result = {"set": "ur10", "split": "tails", "detail": "q1:low:0.3", "size": "100", "n_train": 100}
+    results = [
+        result | {"seed": seed, "method": method, "errors": {"mean_mm": mean}}
+        for seed, means in ((7, (0.2, 0.1)), (8, (0.1, 0.2)), (9, (0.2, 0.1)))
+        for method, mean in zip(("ours", "curves"), means, strict=True)
+    ]
+    summary = {"results": results, "methods": ["ours", "curves"], "groups": []}
+    heading, listed = maker.list_of_runs(summary)
+    assert [line.split(" | ")[3] for line in listed.splitlines()[2:]] == ["7", "9"]
+    assert f"2 of 3 are as far behind, on the same sizes ([list](#{anchor_of(heading[3:])}))" in maker.behind(
+        summary
+    )
 
 
 def test_every_public_name_is_in_the_python_reference():

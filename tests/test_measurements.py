@@ -384,7 +384,7 @@ def test_distances_that_nothing_names_lead_to_one_anchor() -> None:
     data = Measurements.from_dataframe(wire)
     assert data.anchor is not None
     assert data.anchor.tolist() == ["anchor of data"] * 3
-    assert [notice.kind for notice in data.notices] == ["one_anchor"]
+    assert [notice.kind for notice in data.notices] == ["no_anchor_named"]
     assert not Measurements.from_dataframe(wire.assign(anchor="box")).notices
 
 

@@ -123,6 +123,17 @@ def test_set_points_are_corrected(client, calib):
     assert degrees["q_deg"] == pytest.approx(np.degrees(expected), abs=1e-6)
 
 
+def test_joints_that_must_not_move_do_not(calib):
+    known = ta.Calibration.load(calib)
+    expected = ta.Compensator(known, task="position", moving=(1, 2, 3)).correct(HOME)
+    options = ("--ramp-s=0.05", "--deadline-s=10", "--task=position", "--moving=1,2,3")
+    with serving(calib, *options) as (found, _), Client(found) as client:
+        client.read()
+        answer = settle(client, {"q": HOME})
+    assert answer["q"] == pytest.approx(expected, abs=1e-9)
+    assert answer["q"][3:] == HOME[3:]
+
+
 def test_what_has_no_correction_holds_the_last_one(client):
     before = settle(client, {"q": HOME})
     for missing in (None, [*HOME[:5], None]):
@@ -356,7 +367,9 @@ def test_ctrl_c_ends_it_cleanly(calib):
         assert "the server ends" in said
 
 
-@pytest.mark.parametrize("option", ["--tool-mm=1,2", "--tool-mm=a,b,c", "--feature=warm"])
+@pytest.mark.parametrize(
+    "option", ["--tool-mm=1,2", "--tool-mm=a,b,c", "--feature=warm", "--task=tool", "--moving=a"]
+)
 def test_options_are_checked(calib, option, capsys):
     assert main(["serve", str(calib), option]) == 2
     assert "Traceback" not in capsys.readouterr().err

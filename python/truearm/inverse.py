@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truearm._core import CoreError
 from truearm._core import Inverse as Solver
 from truearm.arrays import as_rows, as_transforms
 from truearm.errors import InputError, WorkError, count_of, list_rows
@@ -59,7 +60,7 @@ class Inverse:
 
         Raises:
             InputError: If the pose is not a rigid transform, or they are several.
-            CoreError: If a pose of the arm's has more than 100,000 readings that differ by whole turns.
+            WorkError: If a pose of the arm's has more than 100,000 readings that differ by whole turns.
         """
         poses, single = as_transforms(base_from_flange, what="the poses")
         if not single:
@@ -68,7 +69,10 @@ class Inverse:
                 rule="The shape must be (4, 4)",
                 way_out="branches() and near() take many poses",
             )
-        return self._solver.solutions(poses[0], turns)
+        try:
+            return self._solver.solutions(poses[0], turns)
+        except CoreError as error:
+            raise WorkError(str(error), way_out="Give narrower joint limits, or turns=False") from None
 
     def branches(self, base_from_flange: ArrayLike) -> Floats:
         """The solutions of many poses (n, 4, 4) without turns: (n, K, N), filled up with NaN to the most, K.

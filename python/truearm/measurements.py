@@ -300,8 +300,8 @@ class Measurements:
         are called after their file are set-ups of their own, as with `read_files`, and so is the fixed point
         that their distances lead to where nothing names it: files of one name are called by their folders
         as well, and tables of one name are numbered, "data" and "data 2". Rows that were selected from the
-        same table belong to the same set-up. Of tables that were not read at once, as one that has grown or
-        the rows of a loaded calibration, it is told by the rows that both have.
+        same table belong to the same set-up. Tables that were read separately, as one that has grown and its
+        earlier state or the rows of a loaded calibration, are one set-up only if they share rows.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.

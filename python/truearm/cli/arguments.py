@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeAlias, get_type_hints
+from typing import Annotated, Any, Final, TypeAlias, get_args, get_type_hints
 
 import typer
 from typer.models import ParameterInfo
@@ -33,7 +33,10 @@ CalibFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
 ]
 MeasurementFiles: TypeAlias = Annotated[
-    list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
+    list[Path],
+    typer.Argument(
+        metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own, or with a column group."
+    ),
 ]
 CellFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="CELL", help="A cell file: arm, devices and their ports.")
@@ -71,6 +74,12 @@ Feature: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs; repeat."),
 ]
+Task: TypeAlias = Annotated[
+    str, typer.Option(metavar="pose|axis|position", help="What of the tool is to be met.")
+]
+Moving: TypeAlias = Annotated[
+    str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
+]
 LargestMm: TypeAlias = Annotated[float, typer.Option(help="Largest shift of the tool.")]
 LargestDeg: TypeAlias = Annotated[float, typer.Option(help="Largest turn of the tool.")]
 LargestStdMm: TypeAlias = Annotated[
@@ -96,6 +105,33 @@ def features_of(stated: Sequence[str] | None) -> dict[str, float]:
             raise UsageError(f'"{name}" has two values', where="--feature", rule="A feature has one")
         found[name] = number
     return found
+
+
+def joints_of(stated: str | None) -> list[int] | None:
+    """Numbers of joints of the words of :data:`Moving`, such as "1,2,3"; None for all.
+
+    Raises:
+        UsageError: If they are no numbers.
+    """
+    if stated is None:
+        return None
+    try:
+        return [int(part) for part in stated.split(",")]
+    except ValueError:
+        rule = "It must be numbers of joints with commas, such as 1,2,3"
+        raise UsageError(f'"{stated}"', where="--moving", rule=rule) from None
+
+
+def one_of(option: str, stated: str, choices: Any) -> Any:  # noqa: ANN401
+    """`stated`, which has to be one of `choices`, a Literal.
+
+    Raises:
+        UsageError: If it is none of them.
+    """
+    allowed = get_args(choices)
+    if stated not in allowed:
+        raise UsageError(f'"{stated}"', where=option, rule=f"It must be {' or '.join(allowed)}")
+    return stated
 
 
 def offer_choices(function: Callable[..., Any]) -> None:

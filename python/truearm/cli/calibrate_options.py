@@ -82,7 +82,7 @@ Composition: TypeAlias = Annotated[
     str, typer.Option(metavar="min|product", help="Networks: how sensors combine.")
 ]
 RepeatabilityMm: TypeAlias = Annotated[
-    float | None, typer.Option(metavar="MM", help="Of the arm; errors are told in parts of it too.")
+    float | None, typer.Option(metavar="MM", help="Of the arm; errors are also reported in parts of it.")
 ]
 Degree: TypeAlias = Annotated[int, typer.Option(hidden=True)]
 Threads: TypeAlias = Annotated[int | None, typer.Option(hidden=True, min=1)]

@@ -9,7 +9,10 @@ def command(
     cell: CellFile,
     as_json: AsJson = False,
 ) -> None:
-    """Connect to the devices of a cell and ask them where they are; nothing moves but what connecting moves.
+    """Connect to the devices of a cell and ask them where they are.
+
+    Connecting an RV-M2 drives it to its mechanical origin; nothing here can stop that motion. No other robot
+    moves.
 
     Examples:
       truearm cell check cell.toml

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal
 
 import typer
 
@@ -15,7 +15,11 @@ from truearm.cli.arguments import (
     LargestDeg,
     LargestMm,
     LargestStdMm,
+    Moving,
+    Task,
     features_of,
+    joints_of,
+    one_of,
 )
 from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.given import given_options
@@ -38,8 +42,8 @@ def command(
     frames: option.Frames = None,
     programming: option.Programming = None,
     language: option.Language = None,
-    task: option.Task = "pose",
-    moving: option.Moving = None,
+    task: Task = "pose",
+    moving: Moving = None,
     feature: Feature = None,
     on_refusal: option.OnRefusal = "stop",
     largest_mm: LargestMm = LARGEST_MM,
@@ -65,7 +69,7 @@ def command(
       truearm compensate arm.calib pick.prg -o out/ --frames frames.toml
     """
     from truearm.cli.rewritten import print_rewritten
-    from truearm.limits import Task
+    from truearm.limits import Task as WhatIsMet
     from truearm.programs.densify import Spacing
     from truearm.programs.languages import language_of
     from truearm.programs.report import report_of
@@ -82,12 +86,12 @@ def command(
         raise UsageError("--least-spacing-mm says nothing alone", way_out="Give --densify-mm as well")
     least_mm = LEAST_SPACING_MM if least_spacing_mm is None else least_spacing_mm
     spacing = None if densify_mm is None else Spacing.of(densify_mm, least_mm)
-    choices = ta.Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language, offsets_mm)
+    choices = ta.Choices(one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language, offsets_mm)
     compensator = ta.Compensator(
         ta.Calibration.load(calibration),
         programming=None if programming is None else ta.Robot.load(programming),
-        task=_one_of("--task", task, Task),
-        moving=_joints(moving),
+        task=one_of("--task", task, WhatIsMet),
+        moving=joints_of(moving),
         limits=limits,
         features=features_of(feature),
     )
@@ -160,21 +164,3 @@ def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:
     else:
         when = "Run it slowly at first. This tells whether the arm is still as it was calibrated:"
         suggest(f"truearm evaluate {typed(calibration)} MEASURED.csv", when=when)
-
-
-def _one_of(option: str, given: str, choices: Any) -> Any:  # noqa: ANN401
-    allowed = get_args(choices)
-    if given not in allowed:
-        raise UsageError(f'"{given}"', where=option, rule=f"It must be {' or '.join(allowed)}")
-    return given
-
-
-def _joints(given: str | None) -> list[int] | None:
-    if given is None:
-        return None
-    try:
-        return [int(part) for part in given.split(",")]
-    except ValueError:
-        raise UsageError(
-            f'"{given}"', where="--moving", rule="It must be numbers of joints with commas, such as 1,2,3"
-        ) from None

@@ -34,12 +34,6 @@ Programming: TypeAlias = Annotated[
 Language: TypeAlias = Annotated[
     str | None, typer.Option(metavar="NAME", help="Language.  [default: by the ending]")
 ]
-Task: TypeAlias = Annotated[
-    str, typer.Option(metavar="pose|axis|position", help="What of the tool is to be met.")
-]
-Moving: TypeAlias = Annotated[
-    str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
-]
 OnRefusal: TypeAlias = Annotated[
     str,
     typer.Option(metavar="stop|keep-nominal", help="What becomes of targets that cannot be corrected."),
@@ -56,8 +50,7 @@ LeastSpacingMm: TypeAlias = Annotated[
     typer.Option(
         "--least-spacing-mm",
         metavar="MM",
-        help="Least way between inserted waypoints.",
-        show_default=f"{LEAST_SPACING_MM:g}",
+        help=f"Least way between inserted waypoints.  [default: {LEAST_SPACING_MM:g}]",
     ),
 ]
 OffsetsMm: TypeAlias = Annotated[
@@ -66,7 +59,7 @@ OffsetsMm: TypeAlias = Annotated[
         "--offsets-mm",
         metavar="MM",
         help="Change targets that are used with offsets too, where the tool's point stays within this there; "
-        "its turn is told, not bounded.",
+        "its turn is reported, not bounded.",
     ),
 ]
 DryRun: TypeAlias = Annotated[

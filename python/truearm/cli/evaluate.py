@@ -33,8 +33,8 @@ def command(
         int | None,
         typer.Option(
             metavar="N",
-            help="Rows that find frame and tool, all shots of a pose with them.  [default: a third or more, "
-            "of 400 poses at most]",
+            help="Rows used to find frame and tool (shots of a pose stay together).  [default: a third, or "
+            "more for enough values; 400 poses at most]",
         ),
     ] = None,
     keep_tool: Annotated[

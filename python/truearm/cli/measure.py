@@ -38,7 +38,8 @@ def command(
 
     First the frame is registered from a few contacts, then all poses are measured. Every reading is on disk
     before the next motion starts: after Ctrl-C, a fault or a loss of power the same command goes on where it
-    was. Ctrl-C stops the robot, retracts the sensor and ends within 2 s.
+    was. Ctrl-C stops the robot, retracts the sensor and ends within 2 s. Connecting an RV-M2 drives it to its
+    mechanical origin; nothing here can stop that motion.
 
     Examples:
       truearm measure cell.toml poses.csv --dry-run

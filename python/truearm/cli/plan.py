@@ -376,7 +376,7 @@ def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *,
     times = after["o1"] / before["o1"]
     say_wrapped(
         f"They determine the parameters {times:.2f} times as well as poses at random, in the geometric mean "
-        f"(index O1). Condition number {kappa} (columns at 300 mm)."
+        f"(index O1). Condition number {kappa} (1 rad counted as 300 mm)."
     )
     say_wrapped(_motion(plan.seconds, joints))
     tell_ways(plan.passage)

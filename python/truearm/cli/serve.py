@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.arguments import CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm, features_of
+from truearm.cli.arguments import (
+    CalibFile,
+    Feature,
+    LargestDeg,
+    LargestMm,
+    LargestStdMm,
+    Moving,
+    Task,
+    features_of,
+    joints_of,
+    one_of,
+)
 from truearm.cli.console import print_json, say, tell, warn
 from truearm.defaults import DEADLINE_S, HOLD_S, LARGEST_DEG, LARGEST_MM, LARGEST_STD_MM, RAMP_S
 from truearm.errors import InputError, UsageError
@@ -37,6 +48,8 @@ def command(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Tool point in the flange frame.  [default: the robot file's]"),
     ] = None,
+    task: Task = "pose",
+    moving: Moving = None,
     feature: Feature = None,
     largest_mm: LargestMm = LARGEST_MM,
     largest_deg: LargestDeg = LARGEST_DEG,
@@ -57,10 +70,12 @@ def command(
     Examples:
       truearm serve controller.calib
       truearm serve controller.calib --port 0 --largest-mm 3 --json
+      truearm serve palletiser.calib --task position --moving 1,2,3,5
     """
     from truearm.calibration import Calibration
     from truearm.compensation import Compensator
     from truearm.limits import Limits
+    from truearm.limits import Task as WhatIsMet
     from truearm.serving import Server
     from truearm.solving import beyond_notices
     from truearm.streaming import CorrectionStream, StreamOptions
@@ -68,7 +83,13 @@ def command(
     token = _token(address, token_file)
     known = Calibration.load(calibration)
     limits = Limits(largest_mm=largest_mm, largest_deg=largest_deg, largest_std_mm=largest_std_mm)
-    compensator = Compensator(known, limits=limits, features=features_of(feature))
+    compensator = Compensator(
+        known,
+        task=one_of("--task", task, WhatIsMet),
+        moving=joints_of(moving),
+        limits=limits,
+        features=features_of(feature),
+    )
     options = StreamOptions(ramp_s=ramp_s, hold_s=hold_s, deadline_s=deadline_s)
     tool = _tool(tool_mm)
     CorrectionStream(compensator, options, tool=tool)

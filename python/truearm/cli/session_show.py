@@ -16,7 +16,7 @@ MOST_SHOWN: Final = 20
 SKIPPED: Final = {
     "skipped_contacts": "Contact for the frame at pose",
     "skipped": "Pose",
-    "skipped_checks": "Check at pose",
+    "skipped_checks": "Check at contact",
 }
 """What a summary lists that was skipped, and what one of it is called."""
 

@@ -27,7 +27,7 @@ OffsetDeg: TypeAlias = Annotated[
 ]
 ToolMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="The same of the target on the tool.")]
 Level: TypeAlias = Annotated[
-    float, typer.Option(metavar="SHARE", help="Level of significance: unchanged arms not said to hold.")
+    float, typer.Option(metavar="SHARE", help="Share of unchanged arms that are wrongly reported as changed.")
 ]
 RollBack: TypeAlias = Annotated[
     bool, typer.Option("--roll-back", help="Write the calibration as it was before, bit for bit.")

@@ -21,8 +21,8 @@ def one_anchor(data: Measurements, selection: Selection) -> list[Notice]:
         return []
     text = (
         f"All distances go to one fixed point ({anchor}). They tell how far the arm is off on the way to it: "
-        "errors across it are not judged, and may be several times larger than those told, and larger than "
-        "standard deviations say. Measure to two more points as well, in other directions from where the arm "
-        "works, or judge the calibration on measured points (truearm evaluate)."
+        "errors across it are not judged, and may be several times larger than those reported, and larger "
+        "than standard deviations say. Measure to two more points as well, in other directions from where "
+        "the arm works, or judge the calibration on measured points (truearm evaluate)."
     )
     return [Notice(ONE_ANCHOR, text)]

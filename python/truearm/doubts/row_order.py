@@ -42,10 +42,10 @@ def order_notices(task: Task, data: Measurements, progress: Floats) -> list[Noti
         return []
     text = (
         "The rows come in an order of their poses: joint readings and place tell most of when a row was "
-        f"measured ({', '.join(told)}). What drifts meanwhile cannot be told there from what varies with the "
-        "pose, and held-out rows do not show it. Measure in another order, such as the one there and back "
-        "that truearm plan gives. If the rows were sorted later, give them in the order of measuring, or "
-        "--drift none."
+        f"measured ({', '.join(told)}). What drifts meanwhile cannot be distinguished there from what varies "
+        "with the pose, and held-out rows do not show it. Measure in another order, such as the one there "
+        "and back that truearm plan gives. If the rows were sorted later, give them in the order of "
+        "measuring, or --drift none."
     )
     return [Notice(ORDER_OF_POSES, text)]
 

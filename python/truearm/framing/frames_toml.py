@@ -95,8 +95,8 @@ def _world_notices(path: str | Path, name: str, told: IdentifiedFrame, world: Fr
         Notice(
             "world",
             f'{path} has the controller\'s world, object "{world.name}": object "{name}" is written in it, '
-            f"as the controller holds objects, at {x:.3f} {y:.3f} {z:.3f} mm. What else is told is in the "
-            "arm's base",
+            f"as the controller holds objects, at {x:.3f} {y:.3f} {z:.3f} mm. All else that is printed is in "
+            "the arm's base",
         )
     ]
 

@@ -27,6 +27,6 @@ def check_turned(apart: Floats, noun: str) -> None:
         x, y, z = directions[:, 0] * np.sign(directions[np.abs(directions[:, 0]).argmax(), 0])
         raise WorkError(
             f"the {noun} hardly turn the flange's direction [{x:.2f}, {y:.2f}, {z:.2f}]",
-            rule="Where that direction does not move, neither is the tool's length along it told",
+            rule="Where that direction does not move, the tool's length along it is not known either",
             way_out=f"Tilt the tool by 20 deg or more about two axes between {noun}",
         )

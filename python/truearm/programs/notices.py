@@ -131,7 +131,7 @@ def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
         return _carried_notices(carried_joints(known, done.corrected[done.changed], joints), joints)
     return [
         Notice(
-            "stood_still",
+            "moves_still_joint",
             f"the arm was measured with {still_words(moved, joints)} alone, and the program moves it: how "
             "far its targets are off there is not known, whatever std_mm says. Calibrate with poses in which "
             "every joint moves",
@@ -189,7 +189,7 @@ def unknown_tool_notices(done: Rewritten, moving: int) -> list[Notice]:
         return []
     text = (
         f"{unknown[0]}: {moving} joints meet the position of one point first, and that of the robot file's "
-        "tool was taken. The program's own may miss by more than is told. Give its place: --frames FILE"
+        "tool was taken. The program's own may miss by more than is reported. Give its place: --frames FILE"
     )
     return [Notice("tool_unknown", text)]
 

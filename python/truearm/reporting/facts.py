@@ -288,10 +288,10 @@ class Facts:
         """Range of each joint (N, 2): that of the rows but for a percent on either side, else its limits."""
         if self.readings is not None:
             return np.quantile(self.readings, [OUTER, 1.0 - OUTER], axis=0).T
-        return self.reachable
+        return self.within_a_turn
 
     @cached_property
-    def reachable(self) -> Floats:
+    def within_a_turn(self) -> Floats:
         """Range of each joint (N, 2): its limits and a turn at the most, or what was measured."""
         low, high = one_turn(self.calibration.robot)
         if self.readings is not None:
@@ -310,8 +310,8 @@ class Facts:
         return np.asarray(self.readings[np.argmin(np.square((self.readings - centre) / width).sum(axis=1))])
 
     def places(self, joint: int, count: int) -> Floats:
-        """Readings of one joint (count,) from end to end of all that it reaches."""
-        low, high = self.reachable[joint].tolist()
+        """Readings of one joint (count,) from end to end of its turn."""
+        low, high = self.within_a_turn[joint].tolist()
         return np.linspace(low, high, count)
 
     def drawn(self, count: int) -> Floats:

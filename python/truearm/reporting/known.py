@@ -24,7 +24,7 @@ class Known:
     """Standard deviations of the judged point.
 
     Attributes:
-        readings: Configurations (n, N), drawn evenly from the joints' whole ranges.
+        readings: Configurations (n, N), drawn evenly from a turn of each joint, or what was measured.
         std_mm: Root of the sum of the variances of x, y and z (n,), the arm's part alone, mm.
         at_rows_mm: The same at some of the measured poses (k,).
         is_exact: Whether these are exact; bounds of them otherwise.
@@ -69,7 +69,7 @@ def known(facts: Facts) -> Known | None:
 
 def configurations(facts: Facts, count: int) -> Floats:
     """Configurations (n, N) drawn evenly from all that the joints reach; the same every time."""
-    low, high = facts.reachable.T
+    low, high = facts.within_a_turn.T
     return np.asarray(np.random.default_rng(0).uniform(low, high, (count, len(low))))
 
 

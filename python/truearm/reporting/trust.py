@@ -77,8 +77,9 @@ def _overall(facts: Facts, found: Known) -> str:
     return (
         f"Standard deviation of the {facts.point_name} as the arm's model gives it, {noise} "
         f"(root of the summed variances of x, y and z): the median over {where} is {near} mm, "
-        f"over all configurations in the joints' whole ranges {median} mm, and 90 % of these are below "
-        f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations.{facts.at_features}"
+        f"over all configurations within one turn of each joint, or what was measured, {median} mm, and 90 % "
+        f"of these are below {tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations."
+        f"{facts.at_features}"
     )
 
 

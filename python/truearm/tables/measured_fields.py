@@ -250,7 +250,7 @@ def _of_distances(
         f'point, "{own}". If there are several, name them in a column anchor; distances between two '
         "poses have a column pair."
     )
-    return [Notice("one_anchor", text)]
+    return [Notice("no_anchor_named", text)]
 
 
 def _is_given(words: Texts | None, count: int) -> Mask:

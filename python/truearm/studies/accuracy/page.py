@@ -72,7 +72,7 @@ def _standing(summary: Summary) -> str:
     words = (
         "Ours, and its ratio to the best other method, which is named: below one ours is better. "
         "In bold where it is first or within 3 %. They are compared over the runs that both could be fitted "
-        "to, which are told where they are not all."
+        "to, which are counted where they are not all."
     )
     return f"{words}\n\n{_lead_table(summary, _lead_cell)}"
 
