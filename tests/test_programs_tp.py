@@ -227,7 +227,7 @@ def test_the_current_frame_is_certain_only_where_every_motion_has_it(robot):
     assert not why(frame, tool, move)
     assert "UFRAME_NUM is set in line 9, behind motions or branches" in why(tool, move, frame, move)
     assert "behind motions" in why(frame, "  IF R[1]=1,JMP LBL[1]", tool, "  LBL[1]", move)
-    assert "program called in line 9 may set" in why(frame, tool, "  CALL GRIP", move)
+    assert "line 9 may call a program or macro that sets" in why(frame, tool, "  CALL GRIP", move)
     assert "not one number" in why(frame, tool, "  IF (DI[1]=ON),UFRAME_NUM=(3)", move)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.program_tools import Bend, names_changed, reasons, rewritten, says
+from tests.program_tools import Bend, names_changed, read, reasons, rewritten, says
 from tests.test_programs_tp import FINE_STEPS, FRAMES, SHIFT, TP, Q, joints, long_line, pose, program
 from truearm.robot import Robot
 
@@ -76,6 +76,68 @@ def test_the_current_frame_in_all_spellings(robot, lines):
     found = left(robot, [*(f"  {line}" for line in lines), MOVE], current=True)
     assert ("P[1]" not in found) == CURRENT[lines]
     assert CURRENT[lines] or "is not one number throughout the program" in found["P[1]"]
+
+
+MAY_CALL = (
+    "HOME",
+    "Open hand 1",
+    "TOOL CHANGE 2",
+    "CALL GRIP",
+    "call grip",
+    "RUN GRIP",
+    "WAIT DI[1]=ON,CALL GRIP",
+    "IF R[1]=1,CALL GRIP",
+    "IF R[1]=1,HOME",
+    "IF PR[1,R[2]]=5,HOME",
+    "SELECT R[1]=1,CALL GRIP",
+    "=2,CALL GRIP",
+    "ELSE,CALL GRIP",
+    "ERROR_PROG=GRIP",
+    "MONITOR WATCH",
+    "L PAL_1[A_1] 100mm/sec FINE",
+)
+ONLY_HERE = (
+    "",
+    "DO[1]=ON",
+    "DO[1:CALL ME]=PULSE,0.5sec",
+    "R[R[1]]=R[1]+1",
+    "PR[R[1],2]=PR[3,2]",
+    "PR[1]=LPOS",
+    "$MCR.$GENOVERRIDE=50",
+    "WAIT .5(sec)",
+    "WAIT DI[1]=ON TIMEOUT,LBL[9]",
+    "Timer[1]=START",
+    "PAYLOAD[1]",
+    "OVERRIDE=50%",
+    "LINEAR_MAX_SPEED=200",
+    "COL GUARD ADJUST 100",
+    "Arc End[1]",
+    "Skip condition DI[1]=ON",
+    "LOCK PREG",
+    "VISION RUN_FIND 'A'",
+)
+BRANCHING = (
+    "LBL[1]",
+    "jmp lbl[1]",
+    "IF R[1]=1,JMP LBL[1]",
+    "IF (DI[1]),PR[1,2]=(5)",
+    "IF (R[1]=1) THEN",
+    "SELECT R[1]=1,JMP LBL[1]",
+    "=2,JMP LBL[2]",
+    "ELSE,JMP LBL[3]",
+    "ENDFOR",
+)
+
+
+@pytest.mark.parametrize("line", MAY_CALL + ONLY_HERE + BRANCHING)
+def test_what_may_run_something_else_is_no_way_from_target_to_target(robot, line):
+    """Macros are called by their name alone, and may move the arm and set frames."""
+    position = pose(robot, 1, Q[0], ("1", "2")).replace("UF : 1, UT : 2", "UF : F, UT : F")
+    lines = ["  UFRAME_NUM=1", "  UTOOL_NUM=2", "J P[2] 10% FINE", f"  {line}", MOVE]
+    found = read(TP, program(lines, [position, joints(2, Q[0])]), robot, FRAMES)
+    assert found.moves.follows.tolist() == [False, line in ONLY_HERE]
+    why = found.environments[found.moves.environment[1]].tool.unknown
+    assert why == ("line 10 may call a program or macro that sets UTOOL_NUM" if line in MAY_CALL else "")
 
 
 SHIFTED = {

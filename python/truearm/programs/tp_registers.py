@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+from truearm.programs.tp_calls import may_leave
+
 Placed = tuple[float, float, float, float, float, float]
 
 _OF_ONE: Final = r"\[\s*(?:GP1\s*:\s*)?(\d+)\s*(?::[^\[\],]*)?"
@@ -13,15 +15,12 @@ _ELEMENT: Final = re.compile(
 _FRAME: Final = re.compile(rf"\s*(UFRAME|UTOOL){_OF_ONE}\]\s*=\s*PR{_OF_ONE}\]\s*", re.IGNORECASE)
 _REGISTER: Final = re.compile(rf"\s*PR{_OF_ONE}[\],].*", re.IGNORECASE)
 _ANY_REGISTER: Final = re.compile(r"\s*PR\s*\[", re.IGNORECASE)
-_MOTION: Final = re.compile(r"\s*[JLCAS]\s*PR?\[(?!.*(=|\b(?:TA|TB|DB|CALL|RUN)\b))")
-_HARMLESS: Final = re.compile(
-    r"\s*(\Z|(R|SR|F|M|DO|RO|AO|GO|SO|UO|WO|TIMER)\[[^=]*=(?!.*\b(CALL|RUN)\b)"
-    r"|(UFRAME_NUM|UTOOL_NUM)\b[^=]*=|OVERRIDE\s*=|\$WAITTMOUT\s*="
-    r"|(WAIT|PAUSE|END|ABORT)\b(?!.*\b(CALL|RUN)\b)|(PAYLOAD|MESSAGE|UALM)\s*\["
-    r"|(ARC\s+(START|END)|WEAVE|COL\s+(DETECT|GUARD)|LINEAR_MAX_SPEED|JOINT_MAX_SPEED)\b"
-    r"|(SKIP|OFFSET|TOOL_OFFSET)\s+CONDITION\b)",
+_MAY_SET: Final = re.compile(
+    r"\s*(?!\s|(R|SR|F|M|DO|RO|AO|GO|SO|UO|WO|TIMER)\[|(UFRAME_NUM|UTOOL_NUM|OVERRIDE|\$WAITTMOUT"
+    r"|LINEAR_MAX_SPEED|JOINT_MAX_SPEED|WAIT|SKIP)\b).*=",
     re.IGNORECASE,
 )
+"""What may set a register or a frame: any assignment but to what surely is none, in a motion too."""
 AXES: Final = range(1, 7)
 
 
@@ -47,7 +46,7 @@ class StatedFrames:
             self._registers.pop(int(register.group(1)), None)
         elif _ANY_REGISTER.match(text) is not None:
             self._registers.clear()
-        elif _MOTION.match(text) is None and _HARMLESS.match(text) is None:
+        elif may_leave(text) or _MAY_SET.match(text) is not None:
             self._registers.clear()
             self._frames.clear()
 
