@@ -189,7 +189,7 @@ def _broken(text):
         text.replace("deg\n}", "deg,\n\tE1=   900.000  mm\n}"): "external axis E1 moves with the arm",
         text.replace(
             "N U T,", "N L U T,"
-        ): "its CONFIG is not three letters N/F U/D T/B and three turn numbers",
+        ): "its CONFIG is not three letters N/F U/D T/B and three turn numbers of at most 99",
         text.replace("R =", "Q ="): "it does not state R",
     }
 

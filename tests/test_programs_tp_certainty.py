@@ -1,5 +1,7 @@
 """FANUC listings: frames and targets that are certain only while a program runs; how files may be written."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -210,3 +212,28 @@ def test_a_number_that_positions_share_tells_none_of_them(robot):
     why = f"/POS has its number more than once, in lines {lines[0]} and {lines[1]}"
     assert reasons(done) == [(line, "P[2]", why) for line in lines]
     assert done.program.unsure == {0, 2}
+
+
+HUGE = "9" * 400
+TOO_LARGE = {
+    (r"0'", f"{HUGE}'"): "its CONFIG is not three letters",
+    (r"0'", f"-{HUGE[:20]}'"): "its CONFIG is not three letters",
+    (r"X = *[-\d.]+", "X = 1e999"): "its X is too large for a number",
+    (r"W = *[-\d.]+", f"W = -{HUGE}"): "its W is too large for a number",
+    (r"J1= *[-\d.]+", "J1= 1e999"): "its J1 is too large for a number",
+}
+
+
+@pytest.mark.parametrize("written", TOO_LARGE)
+def test_a_number_that_is_too_large_leaves_its_position(robot, written):
+    places = [pose(robot, 1, Q[0]), joints(2, Q[0])]
+    text = re.sub(*written, program(["J P[1] 10% FINE", "J P[2] 10% FINE"], places))
+    result = rewritten(TP, text, robot, by=SHIFT)
+    assert len(names_changed(result)) == 1
+    assert [reason.startswith(TOO_LARGE[written]) for *_, reason in reasons(result)] == [True]
+
+
+def test_a_number_that_is_too_large_sets_no_frame(robot):
+    sets = [f"  PR[1,{axis}]={HUGE if axis == 1 else 0}" for axis in range(1, 7)]
+    found = left(robot, [*sets, "  UFRAME[1]=PR[1]", MOVE])
+    assert found["P[1]"].endswith("when the program runs")

@@ -1,6 +1,7 @@
 """Frames that a FANUC listing states itself: position registers set to constants, frames set to registers."""
 
 import re
+from math import isfinite, nan
 from typing import Final
 
 from truearm.programs.tp_calls import may_leave
@@ -57,6 +58,6 @@ class StatedFrames:
     def _set(self, frame: tuple[str, int], register: int) -> None:
         held = self._registers.get(register, {})
         self._frames.pop(frame, None)
-        if all(axis in held for axis in AXES):
+        if all(isfinite(held.get(axis, nan)) for axis in AXES):
             x, y, z, w, p, r = (held[axis] for axis in AXES)
             self._frames[frame] = (x, y, z, w, p, r)
