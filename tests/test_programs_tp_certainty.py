@@ -227,7 +227,8 @@ TOO_LARGE = {
 @pytest.mark.parametrize("written", TOO_LARGE)
 def test_a_number_that_is_too_large_leaves_its_position(robot, written):
     places = [pose(robot, 1, Q[0]), joints(2, Q[0])]
-    text = re.sub(*written, program(["J P[1] 10% FINE", "J P[2] 10% FINE"], places))
+    sought, put = written
+    text = re.sub(sought, put, program(["J P[1] 10% FINE", "J P[2] 10% FINE"], places))
     result = rewritten(TP, text, robot, by=SHIFT)
     assert len(names_changed(result)) == 1
     assert [reason.startswith(TOO_LARGE[written]) for *_, reason in reasons(result)] == [True]

@@ -116,6 +116,47 @@ def test_functions_that_call_each_other_many_times_are_walked_once():
     assert program.environments[int(program.moves.environment[move])].tool.true[2, 3] == pytest.approx(0.2)
 
 
+HOME = "[[0,10,20,0,40,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+DEEP = {
+    "a sum": (UrScript(), UR10, f"def p():\n x = {'+'.join(['1'] * 3000)}\n", "movej([0,0,0,0,0,0])\nend\n"),
+    "indices": (UrScript(), UR10, f"def p():\n x = a{'[0]' * 3000}\n", "movej([0,0,0,0,0,0])\nend\n"),
+    "conditions": (
+        RAPID(),
+        ABB,
+        f"PROC main()\n{'IF a ' * 1500}",
+        f"MoveAbsJ {HOME},v1,fine,tool0;\nENDPROC\n",
+    ),
+    "calls": (
+        KRL(),
+        KUKA,
+        "DEF m()\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\ns0()\nEND\n",
+        "".join(f"DEF s{n}()\ns{n + 1}()\nEND\n" for n in range(400)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DEEP)
+def test_a_text_may_be_as_deep_as_it_likes(name):
+    language, robot, before, behind = DEEP[name]
+    assert len(read(language, before + behind, robot).moves) == 1
+
+
+LIN = "LIN {X 400,Y 0,Z 500,A 0,B 90,C 0,S 2,T 35}\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "known"),
+    [("", True), ("again(n)\n", True), ("$TOOL=$NULLFRAME\n", False), ("FOREIGN()\n", False)],
+)
+def test_routines_of_krl_that_call_each_other_leave_the_tool_where_none_sets_it(body, known):
+    text = f"DEF m()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nagain(1)\n{LIN}END\n"
+    text += f"DEF again(n:IN)\nIF n>1 THEN\nother(n)\nENDIF\nEND\nDEF other(n:IN)\nagain(n-1)\n{body}END\n"
+    program = read(KRL(), text, KUKA)
+    assert program.environments[int(program.moves.environment[0])].tool.unknown[:18] == (
+        "" if known else "tool: a subroutine"
+    )
+
+
 def test_a_joint_that_drives_a_screw_is_not_turned_by_a_full_turn():
     robot = Robot.load("adept-cobra-600")
     coupling, limits = robot.coupling.copy(), robot.limits.copy()

@@ -224,19 +224,20 @@ class RapidReading:
             self._confs.note("if")
 
     def _short_if(self, reader: Reader) -> None:
-        """IF condition instruction; the instruction may or may not be executed."""
-        condition = [reader.take() for _ in range(instruction_place(reader.rest()))]
-        self._mention(condition, READ)
-        self._run_functions(condition)
-        state = self._flow.state
-        self._flow.jump()
-        self._confs.note("if")
-        if reader.peek() == "if":
-            self._short_if(reader)
-        elif not reader.done:
+        """IF condition instruction; the instruction, another IF too, may or may not be executed."""
+        states = []
+        while reader.peek() == "if":
+            condition = [reader.take() for _ in range(instruction_place(reader.rest()))]
+            self._mention(condition, READ)
+            self._run_functions(condition)
+            states.append(self._flow.state)
+            self._flow.jump()
+            self._confs.note("if")
+        if not reader.done:
             self._statement(reader)
-        self._confs.note("close")
-        self._flow.state = _joined(state, self._flow.state)
+        for state in reversed(states):
+            self._confs.note("close")
+            self._flow.state = _joined(state, self._flow.state)
         self._flow.jump()
         while not reader.done:
             reader.take()
