@@ -7,18 +7,20 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from tests.program_tools import Bend, read, reasons, rewritten
+from tests.program_tools import Bend, read, reasons, rewritten, survives
 from truearm.cli import main
 from truearm.programs.densify import Spacing
 from truearm.programs.krl import KRL
 from truearm.programs.melfa import MelfaBasic
 from truearm.programs.rapid import RAPID
+from truearm.programs.tp import FanucTp
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 from truearm.turns import NearestTurns, with_turns
 
-KUKA, ABB, UR10 = (Robot.load(name) for name in ("kuka-kr-6-r900", "abb-irb-120", "ur10"))
+ARMS = ("kuka-kr-6-r900", "abb-irb-120", "ur10", "fanuc-lr-mate-200id")
+KUKA, ABB, UR10, FANUC = (Robot.load(name) for name in ARMS)
 IN_KRL = """DEF p()
 $TOOL={X 0,Y 0,Z 0,A 0,B 0,C 0}
 $BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}
@@ -139,6 +141,36 @@ DEEP = {
 def test_a_text_may_be_as_deep_as_it_likes(name):
     language, robot, before, behind = DEEP[name]
     assert len(read(language, before + behind, robot).moves) == 1
+
+
+LONG = "9" * 5000
+TOO_LONG = {
+    "a position": (
+        FanucTp(),
+        FANUC,
+        f"/MN\n 1:J P[{LONG}] 10% FINE ;\n/POS\nP[1]{{\n J1= 0 deg\n}};\n/END\n",
+    ),
+    "its number": (
+        FanucTp(),
+        FANUC,
+        f"/MN\n 1:J P[1] 10% FINE ;\n/POS\nP[{LONG}]{{\n J1= 0 deg\n}};\n/END\n",
+    ),
+    "a frame": (FanucTp(), FANUC, f"/MN\n 1:  PR[{LONG},1]=0 ;\n 2:  UFRAME[{LONG}]=PR[1] ;\n/POS\n/END\n"),
+    "a line": (MelfaBasic(), Robot.load("mitsubishi-rv-4fl"), f"{LONG} Mov J1\nJ1=(0,0,0,0,0,0)\n"),
+    "bits": (KRL(), KUKA, f"DEF m()\nPTP {{X 400,Y 0,Z 500,A 0,B 90,C 0,S 'B{'1' * 2000}',T 35}}\nEND\n"),
+    "an exponent": (UrScript(), UR10, f"def p():\n movej([0,0,0,0,0,0.1E-{LONG}])\nend\n"),
+    "an exponent of RAPID": (
+        RAPID(),
+        ABB,
+        f"PROC main()\nMoveAbsJ {HOME.replace('40', f'0e{LONG}')},v1,fine,tool0;\nENDPROC\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_LONG)
+def test_a_number_may_have_more_digits_than_there_are_numbers_of(name):
+    language, robot, text = TOO_LONG[name]
+    assert survives(language, text, robot)
 
 
 LIN = "LIN {X 400,Y 0,Z 500,A 0,B 90,C 0,S 2,T 35}\n"

@@ -13,7 +13,7 @@ from truearm.programs.tp_configuration import LETTERS, MOST_TURNS
 
 JOINTS, POSE = 0, 1
 _SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
-_POSITION: Final = re.compile(r"^P\[(\d+)(?::[^\]\r\n]*)?\]\s*\{(.*?)^\s*\};?", re.MULTILINE | re.DOTALL)
+_POSITION: Final = re.compile(r"^P\[(\d{1,9})(?::[^\]\r\n]*)?\]\s*\{(.*?)^\s*\};?", re.MULTILINE | re.DOTALL)
 _OPENING: Final = re.compile(r"^P\[(\d+)", re.MULTILINE)
 _GROUP: Final = re.compile(r"\bGP(\d+)\s*:")
 _FIELD: Final = re.compile(

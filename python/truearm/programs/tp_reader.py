@@ -23,7 +23,7 @@ from truearm.types import Floats
 
 _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
-_TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
+_TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d{1,9}(?!\d)|A?R\[\d+[^\]]*\])[^\]]*\]")
 _COMMENT: Final = re.compile(r":[^\[\]\n]*(?=\])")
 _ASSIGNED: Final = re.compile(r"\s*=(?!=)")
 _STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
