@@ -8,6 +8,7 @@ from truearm.controller import Controller
 from truearm.inverse import Inverse
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
+from truearm.programs.layouts import of_joints
 from truearm.programs.rewriting import Choices, Models, rewrite
 from truearm.programs.source import Source
 from truearm.programs.uses import Uses
@@ -88,7 +89,7 @@ def obeyed(program, robot, before):
         layout = program.layouts[targets.layout[target]]
         places = slice(targets.first[target], targets.first[target + 1])
         values = (targets.values[places] * targets.factors[places])[None]
-        if not hasattr(layout, "configuration"):
+        if of_joints(layout):
             found[target] = layout.to_readings(values)[0]
             continue
         if uses.environment[target] < 0:

@@ -149,6 +149,22 @@ def test_an_offset_or_tool_that_the_program_changes_is_not_its_constant(robot, u
     assert "P1" not in left(robot, [TOOL, "If POFF.Z>3 Then M1=POFF.Z+PA(1).Z", use], **stored)
 
 
+FUNCTION = ["End", "Function M Grip(M1)", "Mvs P3", "Grip=1", "FEnd"]
+RUNNING = ["M1=Grip(1)", "GRIP(1)", "If Grip(1)=1 Then M1=2", "Dly 0.1:M1=Abs(Grip(1))"]
+
+
+@pytest.mark.parametrize("call", RUNNING)
+def test_behind_a_function_that_may_move_the_arm_it_stands_anywhere(robot, call):
+    text = program(robot, [TOOL, "Mov P1", call, "Mvs P2", *FUNCTION])
+    assert read(MELFA, text, robot).moves.follows.tolist() == [False, False, False]
+
+
+@pytest.mark.parametrize("line", ["M1=Abs(M2)", "MGrip=1", "Dly 0.5", "M_Out(1)=1", "*L1", "End"])
+def test_a_function_is_entered_by_its_name_alone(robot, line):
+    text = program(robot, [TOOL, "Mov P1", line, "Mvs P2", *FUNCTION])
+    assert read(MELFA, text, robot).moves.follows.tolist() == [False, line[0] not in "*E", False]
+
+
 def test_a_tool_that_is_stored_as_it_is_assigned_is_its_constant(robot):
     lines = ["PGRIP=(0,0,120,0,0,0)(0,0)", "Tool PGRIP", "Mov P1"]
     assert left(robot, lines, PGRIP="(+0.00,+0.00,+120.00,+0.00,+0.00,+0.00)(0,0)") == {}

@@ -222,6 +222,21 @@ def test_frames_from_outside_and_frames_that_were_taught_wrongly():
     assert environment.payload_kg == 1.5
 
 
+@pytest.mark.parametrize("comma", [",", " , ", ",\r\n"])
+def test_options_behind_a_comma_are_those_of_the_argument_before(comma):
+    data = f"{points()}\nPERS loaddata heavy:=[5,[0,0,50],[1,0,0,0],0,0,0];"
+    turned = f"RelTool(pB,0,0,5{comma}\\Rz:=10)"
+    body = f"MoveJ pA,v100,fine,tG{comma}\\WObj:=wT{comma}\\TLoad:=heavy;\nMoveJ {turned},v1,fine,tG;"
+    first, second = (
+        program.environments[number]
+        for program in [read("demo.mod", module(body, data), ABB)]
+        for number in program.moves.environment
+    )
+    assert (first.work_object.name, first.payload_kg) == ("wT", 5.0)
+    np.testing.assert_allclose(first.work_object.controller, TABLE)
+    assert second.after[0, 1] == pytest.approx(-np.sin(np.deg2rad(10.0)))
+
+
 def test_straight_motion_must_agree_with_its_configuration_data():
     flipped = re.sub(r"\[0,0,-1,0\]", "[0,-2,0,1]", numbers(SEEN["pB"]))
     found = reasons(f"MoveJ pA,{GO}\nMoveL {flipped},{GO}", points())
@@ -431,7 +446,11 @@ def test_a_byte_order_mark_stays_in_front(start):
         assert done.contents[0].decode("latin-1").startswith(f"{head}! mark\nCONST")
 
 
-PLAIN = ["MoveL pB,v100,fine,tG;", "MoveL pB,v100\\V:=50,z1\\Z:=2,tG\\WObj:=wT\\TLoad:=load0;"]
+PLAIN = [
+    "MoveL pB,v100,fine,tG;",
+    "MoveL pB,v100\\V:=50,z1\\Z:=2,tG\\WObj:=wT\\TLoad:=load0;",
+    "MoveL pB,v100,\\V:=50,fine,tG,\\WObj:=wT;",
+]
 NOT_TWICE = [
     "MoveL pB,v100\\T:=5,fine,tG;",
     "MoveL pB,v100,z10\\Inpos:=inpos50,tG;",

@@ -106,3 +106,14 @@ def test_asking_for_the_length_of_an_array_computes_with_none_of_its_targets():
 )
 def test_arrays_whose_targets_are_not_written_out(target, reason):
     assert reasons(f"pb:=pa;\nMoveJ {target},{TO};", data=f"{DATA}\n{PATH}")[-1:] == [reason]
+
+
+@pytest.mark.parametrize(
+    "offset",
+    ["Offs(pA,0,0,nFar)", "Offs(pA,1e400,0,0)", "RelTool(pA,0,0,0\\Rz:=nFar/2)", "Offs(pA,nFar-nFar,0,0)"],
+)
+@pytest.mark.filterwarnings("error")
+def test_an_offset_that_is_too_large_for_a_number_is_none(offset):
+    target = numbers(Q1, tool=np.eye(4), placed=np.eye(4))
+    data = f"CONST num nFar:=1e300*1e300;\nCONST robtarget pA:={target};"
+    assert set(reasons(f"MoveJ {offset},{TO};", data=data)) == {"its offset is computed at run time"}

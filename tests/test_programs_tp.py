@@ -189,7 +189,7 @@ def _broken(text):
         text.replace("deg\n}", "deg,\n\tE1=   900.000  mm\n}"): "external axis E1 moves with the arm",
         text.replace(
             "N U T,", "N L U T,"
-        ): "its CONFIG is not three letters N/F U/D T/B and three turn numbers",
+        ): "its CONFIG is not three letters N/F U/D T/B and three turn numbers of at most 99",
         text.replace("R =", "Q ="): "it does not state R",
     }
 
@@ -227,7 +227,7 @@ def test_the_current_frame_is_certain_only_where_every_motion_has_it(robot):
     assert not why(frame, tool, move)
     assert "UFRAME_NUM is set in line 9, behind motions or branches" in why(tool, move, frame, move)
     assert "behind motions" in why(frame, "  IF R[1]=1,JMP LBL[1]", tool, "  LBL[1]", move)
-    assert "program called in line 9 may set" in why(frame, tool, "  CALL GRIP", move)
+    assert "line 9 may call a program or macro that sets" in why(frame, tool, "  CALL GRIP", move)
     assert "not one number" in why(frame, tool, "  IF (DI[1]=ON),UFRAME_NUM=(3)", move)
 
 

@@ -1,9 +1,11 @@
 """FANUC listings: frames and targets that are certain only while a program runs; how files may be written."""
 
+import re
+
 import numpy as np
 import pytest
 
-from tests.program_tools import Bend, names_changed, reasons, rewritten, says
+from tests.program_tools import Bend, names_changed, read, reasons, rewritten, says
 from tests.test_programs_tp import FINE_STEPS, FRAMES, SHIFT, TP, Q, joints, long_line, pose, program
 from truearm.robot import Robot
 
@@ -78,6 +80,68 @@ def test_the_current_frame_in_all_spellings(robot, lines):
     assert CURRENT[lines] or "is not one number throughout the program" in found["P[1]"]
 
 
+MAY_CALL = (
+    "HOME",
+    "Open hand 1",
+    "TOOL CHANGE 2",
+    "CALL GRIP",
+    "call grip",
+    "RUN GRIP",
+    "WAIT DI[1]=ON,CALL GRIP",
+    "IF R[1]=1,CALL GRIP",
+    "IF R[1]=1,HOME",
+    "IF PR[1,R[2]]=5,HOME",
+    "SELECT R[1]=1,CALL GRIP",
+    "=2,CALL GRIP",
+    "ELSE,CALL GRIP",
+    "ERROR_PROG=GRIP",
+    "MONITOR WATCH",
+    "L PAL_1[A_1] 100mm/sec FINE",
+)
+ONLY_HERE = (
+    "",
+    "DO[1]=ON",
+    "DO[1:CALL ME]=PULSE,0.5sec",
+    "R[R[1]]=R[1]+1",
+    "PR[R[1],2]=PR[3,2]",
+    "PR[1]=LPOS",
+    "$MCR.$GENOVERRIDE=50",
+    "WAIT .5(sec)",
+    "WAIT DI[1]=ON TIMEOUT,LBL[9]",
+    "Timer[1]=START",
+    "PAYLOAD[1]",
+    "OVERRIDE=50%",
+    "LINEAR_MAX_SPEED=200",
+    "COL GUARD ADJUST 100",
+    "Arc End[1]",
+    "Skip condition DI[1]=ON",
+    "LOCK PREG",
+    "VISION RUN_FIND 'A'",
+)
+BRANCHING = (
+    "LBL[1]",
+    "jmp lbl[1]",
+    "IF R[1]=1,JMP LBL[1]",
+    "IF (DI[1]),PR[1,2]=(5)",
+    "IF (R[1]=1) THEN",
+    "SELECT R[1]=1,JMP LBL[1]",
+    "=2,JMP LBL[2]",
+    "ELSE,JMP LBL[3]",
+    "ENDFOR",
+)
+
+
+@pytest.mark.parametrize("line", MAY_CALL + ONLY_HERE + BRANCHING)
+def test_what_may_run_something_else_is_no_way_from_target_to_target(robot, line):
+    """Macros are called by their name alone, and may move the arm and set frames."""
+    position = pose(robot, 1, Q[0], ("1", "2")).replace("UF : 1, UT : 2", "UF : F, UT : F")
+    lines = ["  UFRAME_NUM=1", "  UTOOL_NUM=2", "J P[2] 10% FINE", f"  {line}", MOVE]
+    found = read(TP, program(lines, [position, joints(2, Q[0])]), robot, FRAMES)
+    assert found.moves.follows.tolist() == [False, line in ONLY_HERE]
+    why = found.environments[found.moves.environment[1]].tool.unknown
+    assert why == ("line 10 may call a program or macro that sets UTOOL_NUM" if line in MAY_CALL else "")
+
+
 SHIFTED = {
     ("Track TAST[1]", MOVE, "Track End"): SENSED,
     ("TRACK AVC[R[2]]", "Weave Sine[1]", MOVE, "Weave End", "Track End"): SENSED,
@@ -148,3 +212,29 @@ def test_a_number_that_positions_share_tells_none_of_them(robot):
     why = f"/POS has its number more than once, in lines {lines[0]} and {lines[1]}"
     assert reasons(done) == [(line, "P[2]", why) for line in lines]
     assert done.program.unsure == {0, 2}
+
+
+HUGE = "9" * 400
+TOO_LARGE = {
+    (r"0'", f"{HUGE}'"): "its CONFIG is not three letters",
+    (r"0'", f"-{HUGE[:20]}'"): "its CONFIG is not three letters",
+    (r"X = *[-\d.]+", "X = 1e999"): "its X is too large for a number",
+    (r"W = *[-\d.]+", f"W = -{HUGE}"): "its W is too large for a number",
+    (r"J1= *[-\d.]+", "J1= 1e999"): "its J1 is too large for a number",
+}
+
+
+@pytest.mark.parametrize("written", TOO_LARGE)
+def test_a_number_that_is_too_large_leaves_its_position(robot, written):
+    places = [pose(robot, 1, Q[0]), joints(2, Q[0])]
+    sought, put = written
+    text = re.sub(sought, put, program(["J P[1] 10% FINE", "J P[2] 10% FINE"], places))
+    result = rewritten(TP, text, robot, by=SHIFT)
+    assert len(names_changed(result)) == 1
+    assert [reason.startswith(TOO_LARGE[written]) for *_, reason in reasons(result)] == [True]
+
+
+def test_a_number_that_is_too_large_sets_no_frame(robot):
+    sets = [f"  PR[1,{axis}]={HUGE if axis == 1 else 0}" for axis in range(1, 7)]
+    found = left(robot, [*sets, "  UFRAME[1]=PR[1]", MOVE])
+    assert found["P[1]"].endswith("when the program runs")

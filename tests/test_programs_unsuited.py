@@ -7,18 +7,20 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from tests.program_tools import Bend, read, reasons, rewritten
+from tests.program_tools import Bend, read, reasons, rewritten, survives
 from truearm.cli import main
 from truearm.programs.densify import Spacing
 from truearm.programs.krl import KRL
 from truearm.programs.melfa import MelfaBasic
 from truearm.programs.rapid import RAPID
+from truearm.programs.tp import FanucTp
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 from truearm.turns import NearestTurns, with_turns
 
-KUKA, ABB, UR10 = (Robot.load(name) for name in ("kuka-kr-6-r900", "abb-irb-120", "ur10"))
+ARMS = ("kuka-kr-6-r900", "abb-irb-120", "ur10", "fanuc-lr-mate-200id")
+KUKA, ABB, UR10, FANUC = (Robot.load(name) for name in ARMS)
 IN_KRL = """DEF p()
 $TOOL={X 0,Y 0,Z 0,A 0,B 0,C 0}
 $BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}
@@ -114,6 +116,77 @@ def test_functions_that_call_each_other_many_times_are_walked_once():
     program = read(UrScript(), "\n".join(lines), UR10)
     move = int(np.flatnonzero(program.moves.moving)[0])
     assert program.environments[int(program.moves.environment[move])].tool.true[2, 3] == pytest.approx(0.2)
+
+
+HOME = "[[0,10,20,0,40,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+DEEP = {
+    "a sum": (UrScript(), UR10, f"def p():\n x = {'+'.join(['1'] * 3000)}\n", "movej([0,0,0,0,0,0])\nend\n"),
+    "indices": (UrScript(), UR10, f"def p():\n x = a{'[0]' * 3000}\n", "movej([0,0,0,0,0,0])\nend\n"),
+    "conditions": (
+        RAPID(),
+        ABB,
+        f"PROC main()\n{'IF a ' * 1500}",
+        f"MoveAbsJ {HOME},v1,fine,tool0;\nENDPROC\n",
+    ),
+    "calls": (
+        KRL(),
+        KUKA,
+        "DEF m()\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\ns0()\nEND\n",
+        "".join(f"DEF s{n}()\ns{n + 1}()\nEND\n" for n in range(400)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DEEP)
+def test_a_text_may_be_as_deep_as_it_likes(name):
+    language, robot, before, behind = DEEP[name]
+    assert len(read(language, before + behind, robot).moves) == 1
+
+
+LONG = "9" * 5000
+TOO_LONG = {
+    "a position": (
+        FanucTp(),
+        FANUC,
+        f"/MN\n 1:J P[{LONG}] 10% FINE ;\n/POS\nP[1]{{\n J1= 0 deg\n}};\n/END\n",
+    ),
+    "its number": (
+        FanucTp(),
+        FANUC,
+        f"/MN\n 1:J P[1] 10% FINE ;\n/POS\nP[{LONG}]{{\n J1= 0 deg\n}};\n/END\n",
+    ),
+    "a frame": (FanucTp(), FANUC, f"/MN\n 1:  PR[{LONG},1]=0 ;\n 2:  UFRAME[{LONG}]=PR[1] ;\n/POS\n/END\n"),
+    "a line": (MelfaBasic(), Robot.load("mitsubishi-rv-4fl"), f"{LONG} Mov J1\nJ1=(0,0,0,0,0,0)\n"),
+    "bits": (KRL(), KUKA, f"DEF m()\nPTP {{X 400,Y 0,Z 500,A 0,B 90,C 0,S 'B{'1' * 2000}',T 35}}\nEND\n"),
+    "an exponent": (UrScript(), UR10, f"def p():\n movej([0,0,0,0,0,0.1E-{LONG}])\nend\n"),
+    "an exponent of RAPID": (
+        RAPID(),
+        ABB,
+        f"PROC main()\nMoveAbsJ {HOME.replace('40', f'0e{LONG}')},v1,fine,tool0;\nENDPROC\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_LONG)
+def test_a_number_may_have_more_digits_than_there_are_numbers_of(name):
+    language, robot, text = TOO_LONG[name]
+    assert survives(language, text, robot)
+
+
+LIN = "LIN {X 400,Y 0,Z 500,A 0,B 90,C 0,S 2,T 35}\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "known"),
+    [("", True), ("again(n)\n", True), ("$TOOL=$NULLFRAME\n", False), ("FOREIGN()\n", False)],
+)
+def test_routines_of_krl_that_call_each_other_leave_the_tool_where_none_sets_it(body, known):
+    text = f"DEF m()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nagain(1)\n{LIN}END\n"
+    text += f"DEF again(n:IN)\nIF n>1 THEN\nother(n)\nENDIF\nEND\nDEF other(n:IN)\nagain(n-1)\n{body}END\n"
+    program = read(KRL(), text, KUKA)
+    assert program.environments[int(program.moves.environment[0])].tool.unknown[:18] == (
+        "" if known else "tool: a subroutine"
+    )
 
 
 def test_a_joint_that_drives_a_screw_is_not_turned_by_a_full_turn():

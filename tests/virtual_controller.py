@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from truearm.inverse import Inverse
+from truearm.programs.layouts import of_joints
 from truearm.programs.tables import Motion
 from truearm.robot import Robot
 
@@ -40,7 +41,7 @@ class VirtualController:
         layout = program.layouts[targets.layout[target]]
         places = slice(targets.first[target], targets.first[target + 1])
         values = (targets.values[places] * targets.factors[places])[None]
-        if not hasattr(layout, "configuration"):
+        if of_joints(layout):
             return layout.to_readings(values)[0]
         width = layout.width - layout.configuration
         stored = environment.before @ layout.to_poses(values[:, :width])[0] @ environment.after

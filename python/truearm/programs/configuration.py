@@ -63,7 +63,7 @@ def configured(targets: Targets, layouts: Sequence[Layout]) -> list[int]:
     """The targets that state configuration data."""
     found: list[int] = []
     for number, layout in enumerate(layouts):
-        count = getattr(layout, "configuration", 0)
+        count = layout.configuration
         which = np.flatnonzero(targets.layout == number)
         if count and len(which):
             stated = np.isfinite(targets.of(targets.values, which, layout.width)[:, -count:]).any(axis=1)

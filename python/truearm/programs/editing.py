@@ -83,8 +83,7 @@ def _lettered(program: Program) -> dict[int, tuple[str, ...]]:
     """Words of the numbers that are written as words, by place."""
     found: dict[int, tuple[str, ...]] = {}
     for number, layout in enumerate(program.layouts):
-        words: Mapping[int, tuple[str, ...]] = getattr(layout, "words", {})
-        for target in np.flatnonzero(program.targets.layout == number) if words else ():
+        for target in np.flatnonzero(program.targets.layout == number) if layout.words else ():
             first = int(program.targets.first[target])
-            found.update({first + column: known for column, known in words.items()})
+            found.update({first + column: known for column, known in layout.words.items()})
     return found

@@ -1,6 +1,7 @@
 """Arithmetic on numbers that are known before the program runs."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import Final
 
 from truearm.programs.lexing import Token
@@ -13,7 +14,8 @@ Functions = Mapping[str, Callable[[float], float]]
 def constant(
     found: Sequence[Token], known: Mapping[str, float], functions: Functions | None = None
 ) -> float | None:
-    """The value of an expression of numbers, known names, + - * / and parentheses; None for any other.
+    """The value of an expression of numbers, known names, + - * / and parentheses; None for any other, and
+    where it is too large for a number.
 
     Args:
         found: Its tokens.
@@ -22,7 +24,7 @@ def constant(
     """
     folder = _Folder(found, known, functions or {})
     value = folder.sum(0)
-    return value if folder.at == len(found) else None
+    return value if value is not None and isfinite(value) and folder.at == len(found) else None
 
 
 class _Folder:

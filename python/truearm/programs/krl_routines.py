@@ -142,13 +142,32 @@ class Routines:
 
     def leaves(self, name: str) -> bool:
         """Whether a call of a routine certainly leaves tool and base as they are."""
-        routine = self._by_name.get(name)
-        if routine is None:
+        if name not in self._by_name:
             return name in LEAVING
         if name not in self._leaving:
-            self._leaving[name] = False
-            self._leaving[name] = not any(self._sets(routine.file, *place) for place in self._body(routine))
+            self._follow(name)
         return self._leaving[name]
+
+    def _follow(self, name: str) -> None:
+        """Find out of a routine, and of those that it calls, whether they leave tool and base as they are."""
+        callers: dict[str, set[str]] = {}
+        followed, pending = set[str](), [name]
+        while pending:
+            one = pending.pop()
+            if one not in followed and one not in self._leaving:
+                followed.add(one)
+                routine = self._by_name[one]
+                for inner in {
+                    each for place in self._body(routine) for each in self._runs(routine.file, *place)
+                }:
+                    callers.setdefault(inner, set()).add(one)
+                    pending += [inner] if inner in self._by_name else []
+        setting = [one for one in callers if one not in followed and not self.leaves(one)]
+        self._leaving |= dict.fromkeys(followed, True)
+        while setting:
+            changed = [one for one in callers.get(setting.pop(), ()) if self._leaving[one]]
+            self._leaving |= dict.fromkeys(changed, False)
+            setting += changed
 
     def wanders(self, file: int, at: int) -> bool:
         """Whether the routine around a label sets tool or base where a GOTO may lead around it."""
@@ -189,16 +208,20 @@ class Routines:
 
     def _sets(self, file: int, start: int, end: int) -> bool:
         """Whether a line may set what stays until it is changed."""
+        return not all(self.leaves(name) for name in self._runs(file, start, end))
+
+    def _runs(self, file: int, start: int, end: int) -> set[str]:
+        """Names of the routines that a line calls; an empty one where it sets itself what stays."""
         source = self._sources[file]
         found = line_reader(source, start, end).rest()
         words = [token.text.lower() for token in found]
         if not words or words[0] in EXTERNAL:
-            return False
+            return set()
         if words[0] == "bas" and bas_command(words)[0] not in BAS_LEAVING:
-            return True
+            return {""}
         assigned = ASSIGNING.match(source.text, start, end) is not None and words[0] in SETTING
         assigned |= set_later(immediate(found)[1])
-        return assigned or not all(self.leaves(name) for name in called(found))
+        return {*called(found), *([""] if assigned else [])}
 
 
 def _arguments(found: list[Token]) -> set[str]:

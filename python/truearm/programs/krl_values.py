@@ -185,6 +185,8 @@ def _number(reader: Reader) -> Number | None:
         return Number(token.start, token.end, float(int(token.text[2:-1], base)), 0)
     except ValueError:
         reader.fail(f"{token.text} is no number")
+    except OverflowError:
+        reader.fail(f"{token.text} is too large for a number")
 
 
 def _skip_to(reader: Reader, text: str) -> None:

@@ -1,8 +1,9 @@
 """How the numbers of a target stand for joint readings or for a pose, and back."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeGuard
+from types import MappingProxyType
+from typing import ClassVar, Final, Literal, Protocol, TypeGuard
 
 import numpy as np
 
@@ -19,33 +20,12 @@ from truearm.units import FULL_TURN, MM_PER_METRE, RADIANS_PER_DEGREE
 
 HALF_TURN_DEG: Final = 180.0
 LOCKED: Final = 1e-7
+NO_WORDS: Final[Mapping[int, tuple[str, ...]]] = MappingProxyType({})
 DECIMALS_MM, DECIMALS_M, DECIMALS_DEG, DECIMALS_RAD, DECIMALS_QUATERNION = 3, 6, 4, 6, 7
 
 
-class JointLayout(Protocol):
-    """Numbers that stand for joint readings."""
-
-    @property
-    def width(self) -> int:
-        """How many numbers a target has."""
-        ...
-
-    @property
-    def least_decimals(self) -> Sequence[int]:
-        """Digits behind the point that are written at least, (width,)."""
-        ...
-
-    def to_readings(self, values: Floats) -> Floats:
-        """Readings (n, N), rad and m, of numbers (n, width)."""
-        ...
-
-    def from_readings(self, q: Floats, near: Floats) -> Floats:
-        """Numbers (n, width) of readings (n, N); `near` are those that the text has."""
-        ...
-
-
-class PoseLayout(Protocol):
-    """Numbers that stand for a pose: its six or seven, then the integers of its configuration."""
+class _InNumbers(Protocol):
+    """What is told of the numbers of a target, whatever they stand for."""
 
     @property
     def width(self) -> int:
@@ -62,6 +42,37 @@ class PoseLayout(Protocol):
         """Digits behind the point that are written at least, (width,)."""
         ...
 
+    @property
+    def words(self) -> Mapping[int, tuple[str, ...]]:
+        """What numbers that are written as words can be, by column."""
+        ...
+
+
+class JointLayout(_InNumbers, Protocol):
+    """Numbers that stand for joint readings; none of them is of a configuration."""
+
+    @property
+    def kind(self) -> Literal["joints"]:
+        """What the numbers stand for."""
+        ...
+
+    def to_readings(self, values: Floats) -> Floats:
+        """Readings (n, N), rad and m, of numbers (n, width)."""
+        ...
+
+    def from_readings(self, q: Floats, near: Floats) -> Floats:
+        """Numbers (n, width) of readings (n, N); `near` are those that the text has."""
+        ...
+
+
+class PoseLayout(_InNumbers, Protocol):
+    """Numbers that stand for a pose: its six or seven, then the integers of its configuration."""
+
+    @property
+    def kind(self) -> Literal["pose"]:
+        """What the numbers stand for."""
+        ...
+
     def to_poses(self, values: Floats) -> Floats:
         """Poses (n, 4, 4), m, of numbers (n, width - configuration)."""
         ...
@@ -76,12 +87,12 @@ Layout = JointLayout | PoseLayout
 
 def of_pose(layout: Layout) -> TypeGuard[PoseLayout]:
     """Whether the numbers of a layout stand for a pose."""
-    return hasattr(layout, "configuration")
+    return layout.kind == "pose"
 
 
 def of_joints(layout: Layout) -> TypeGuard[JointLayout]:
     """Whether the numbers of a layout stand for joint readings."""
-    return not hasattr(layout, "configuration")
+    return layout.kind == "joints"
 
 
 @dataclass(frozen=True)
@@ -93,6 +104,9 @@ class Joints:
         least_decimals: As in JointLayout.
     """
 
+    kind: ClassVar[Literal["joints"]] = "joints"
+    configuration: ClassVar[int] = 0
+    words: ClassVar[Mapping[int, tuple[str, ...]]] = NO_WORDS
     units: tuple[float, ...]
     least_decimals: tuple[int, ...]
 
@@ -134,6 +148,8 @@ class EulerPose:
         configuration: As in PoseLayout.
     """
 
+    kind: ClassVar[Literal["pose"]] = "pose"
+    words: ClassVar[Mapping[int, tuple[str, ...]]] = NO_WORDS
     columns: tuple[int, int, int] = (0, 1, 2)
     configuration: int = 0
 
@@ -179,6 +195,8 @@ def within_half_turn(layout: Layout, values: Floats) -> Floats:
 class QuaternionPose:
     """X Y Z in mm and a quaternion, w first; the sign is that of the text."""
 
+    kind: ClassVar[Literal["pose"]] = "pose"
+    words: ClassVar[Mapping[int, tuple[str, ...]]] = NO_WORDS
     configuration: int = 0
 
     @property
@@ -207,6 +225,8 @@ class QuaternionPose:
 class RotationVectorPose:
     """x y z in m and a rotation vector in rad."""
 
+    kind: ClassVar[Literal["pose"]] = "pose"
+    words: ClassVar[Mapping[int, tuple[str, ...]]] = NO_WORDS
     configuration: int = 0
     width: int = 6
     least_decimals: tuple[int, ...] = (DECIMALS_M,) * 3 + (DECIMALS_RAD,) * 3

@@ -126,7 +126,7 @@ class Reader:
 def decimals_of(text: str) -> int:
     """Digits behind the point of a number's text; none where a negative exponent puts them out of sight."""
     found = _DIGITS.fullmatch(text)
-    exponent = 0 if found is None else int(found.group(2) or 0)
-    if found is None or exponent < 0:
+    exponent = 0.0 if found is None else float(found.group(2) or 0)
+    if found is None or exponent < 0.0:
         return 0
-    return max(0, len(found.group(1)) - exponent)
+    return int(max(0.0, len(found.group(1)) - exponent))

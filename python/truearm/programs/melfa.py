@@ -23,7 +23,7 @@ from truearm.programs.program import BlendsShortened, LinearStep, Program, StepT
 from truearm.programs.source import Source
 from truearm.robot import Robot
 
-_NUMBERED: Final = re.compile(r"[ \t]*(\d+)[ \t]+.*")
+_NUMBERED: Final = re.compile(r"[ \t]*(\d{1,9})[ \t]+.*")
 LONGEST: Final = 127
 """Characters of a line that controllers take."""
 LONGER_NUMBER: Final = 4

@@ -25,7 +25,8 @@ _INTERRUPTS: Final = (
     (re.compile(r"\s*On\s+Com\b", re.IGNORECASE), re.compile(r"\s*Com\b", re.IGNORECASE)),
 )
 """How interrupts are defined, and how they are let in."""
-_FUNCTION: Final = re.compile(r"\s*(Function|FEnd)\b", re.IGNORECASE)
+_FUNCTION: Final = re.compile(r"\s*(?:Function\b(?:\s+[A-Z]\b)?(?:\s+([A-Za-z]\w*))?|FEnd\b)", re.IGNORECASE)
+"""What begins or ends a function; before its name is the letter of what it returns."""
 _BLOCK: Final = re.compile(
     r"\s*(For|While|Select|Case|Default|Next|WEnd|End\s+Select|Break)\b", re.IGNORECASE
 )
@@ -41,6 +42,12 @@ class _Block:
     word: str
     parts: list[int]
     breaks: list[int] = field(default_factory=list)
+
+
+def functions(statements: Iterable[Statement]) -> set[str]:
+    """The names of a program's functions."""
+    found = [begun for one in statements if (begun := _FUNCTION.match(one.text)) is not None]
+    return {begun.group(1) for begun in found if begun.group(1)}
 
 
 class Ways:

@@ -9,7 +9,7 @@ import numpy as np
 from truearm.programs.environment import IDENTITY, Environment, Frame
 from truearm.programs.frames import Frames, name_at_start, written_out
 from truearm.programs.gathered import Gathered
-from truearm.programs.melfa_flow import Ways
+from truearm.programs.melfa_flow import Ways, functions
 from truearm.programs.melfa_text import (
     JOINTS,
     NAME,
@@ -47,9 +47,8 @@ _TOOL_SET: Final = re.compile(r"\bM_Tool\b[^=]*=", re.IGNORECASE)
 """A tool that is set while a motion goes on (Wth)."""
 _TRACKED: Final = re.compile(r"\s*Trk\s+On\b", re.IGNORECASE)
 _LET_GO: Final = re.compile(r"\s*Trk\s+Off\b", re.IGNORECASE)
-_BRANCHING: Final = re.compile(
-    r"(?<![\w.])(GoSub|GoTo|If|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|XRun|Act|Hlt)\b",
-    re.IGNORECASE,
+_BRANCHING: Final = (
+    "GoSub|GoTo|If|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|XRun|Act|Hlt|Function|FEnd|End"
 )
 _CALLING: Final = re.compile(r"\s*(CallP|RelM)\b", re.IGNORECASE)
 """What lets another program set tool and base."""
@@ -78,6 +77,8 @@ class Reader:
         self._elements: dict[str, list[int]] = {}
         for name, target in self._targets.items():
             self._elements.setdefault(array_of(name), []).append(target)
+        words = "|".join([_BRANCHING, *functions(self._statements)])
+        self._branching = re.compile(rf"(?<![\w.])({words})\b", re.IGNORECASE)
         ways = Ways(self._statements)
         self._jumped_to = ways.jumped_to()
         self._settings = {kind: self._find_settings(kind) for kind in _SET_BY}
@@ -186,7 +187,7 @@ class Reader:
 
     def _statement(self, place: int) -> None:
         statement = self._statements[place]
-        branching = _BRANCHING.search(statement.text) is not None
+        branching = self._branching.search(statement.text) is not None
         behind_branch = statement.part == 0 and self._in_branch
         self._in_branch = bool(statement.lead) or (self._in_branch and statement.part > 0)
         if branching or behind_branch or statement.lead or place in self._jumped_to:

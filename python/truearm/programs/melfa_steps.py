@@ -12,12 +12,12 @@ from truearm.programs.source import Source
 from truearm.programs.stepping import copied, free_numbers, line_start, target_of
 
 _PLAIN: Final = re.compile(rf"([ \t]*\d+(?=[ \t]))?([ \t]*Mvs[ \t]+){NAME}[ \t]*", re.IGNORECASE)
-_LINE_NUMBER: Final = re.compile(r"[ \t]*(\d+)(?=[ \t*])")
+_LINE_NUMBER: Final = re.compile(r"[ \t]*(\d{1,9})(?=[ \t*])")
 _JUMP_TO_NUMBER: Final = re.compile(r"\b(?:GoTo|GoSub|Then|Else)[ \t]*\d", re.IGNORECASE)
 OF_JOINTS, OF_POSE = "J", "P"
 """What the names of variables begin with: whether one holds joints or a position follows from its name."""
 _NAMING: Final = {
-    letter: re.compile(rf"(?<!\w){letter}(\d+)\b", re.IGNORECASE) for letter in (OF_JOINTS, OF_POSE)
+    letter: re.compile(rf"(?<!\w){letter}(\d{{1,9}})\b", re.IGNORECASE) for letter in (OF_JOINTS, OF_POSE)
 }
 LAST_LINE: Final = 32767
 

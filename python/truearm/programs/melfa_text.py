@@ -11,7 +11,7 @@ from truearm.programs.tables import ABSENT, Number
 JOINTS, POSE = 0, 1
 SLOTS: Final = 6
 EMPTY_SLOT: Final = 3
-_NUMBERED: Final = re.compile(r"\s*(\d+)(?=[ \t*])")
+_NUMBERED: Final = re.compile(r"\s*(\d{1,9})(?=[ \t*])")
 _LABEL: Final = re.compile(r"\s*\*\w+")
 _PARTS: Final = re.compile(r"(?<![\w.])(Then|Else|EndIf)\b|:", re.IGNORECASE)
 _STRING_OR_REMARK: Final = re.compile(r"\"[^\"\n]*\"?|'[^\n]*|(?<![\w.])Rem\b[^\n]*", re.IGNORECASE)

@@ -61,6 +61,7 @@ class Declarations:
         twice: Names that are declared more than once, and not as one constant.
         assigned: Names that are assigned to.
         numbers: Values of the constant numbers that are known in the routine that is being read.
+        routines: The routines, by name in small letters.
     """
 
     def __init__(self) -> None:
@@ -69,7 +70,7 @@ class Declarations:
         self.twice: Set[str] = frozenset()
         self.assigned: set[str] = set()
         self.numbers: Mapping[str, float] = {}
-        self._routines: dict[str, Routine] = {}
+        self.routines: dict[str, Routine] = {}
         self._declared: dict[str, _Declared] = {}
         self._known: dict[str, dict[str, float]] = {MODULE: {}}
         self._given: Set[str] = frozenset()
@@ -100,7 +101,7 @@ class Declarations:
 
     def give(self, gifts: Set[tuple[str, str]]) -> None:
         """Names are given to instructions, routines and functions: tuples of one of these and a name."""
-        self._given = changed(gifts, self._routines, self.assigned)
+        self._given = changed(gifts, self.routines, self.assigned)
 
     def doubt(self, name: str) -> str:
         """Why what is known of a name may not hold at run time, in words behind it; empty if it does."""
@@ -132,7 +133,7 @@ class Declarations:
 
     def _begin(self, routine: Routine) -> None:
         self._routine = routine.name
-        self._routines[routine.name] = routine
+        self.routines[routine.name] = routine
         for name in routine.parameters:
             self._note(name, None)
 

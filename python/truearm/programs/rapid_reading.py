@@ -20,6 +20,7 @@ from truearm.programs.rapid_configuration import Confdata
 from truearm.programs.rapid_confs import KINDS, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
+from truearm.programs.rapid_functions import called, harmless
 from truearm.programs.rapid_instructions import (
     COUNTING,
     HARMLESS,
@@ -100,6 +101,7 @@ class RapidReading:
         self._language, self._source, self._robot = language, sources[0], robot
         self._declarations = Declarations()
         self._declarations.gather(self._source)
+        self._harmless = harmless(self._source, self._declarations.routines.keys())
         self._found = Gathered((self._source,))
         self._targets = RapidTargets(self._declarations, self._source, self._found.targets)
         self._frames = RapidFrames(self._declarations, frames)
@@ -114,6 +116,7 @@ class RapidReading:
         self._used: list[int] = []
         self._uses: list[_Use] = []
         self._gifts: set[tuple[str, str]] = set()
+        self._nested: list[int] = []
 
     def program(self) -> Program:
         """The program."""
@@ -149,8 +152,9 @@ class RapidReading:
                 self._declarations.enter(MODULE)
         elif word in CLOSING:
             reader.take()
-            flow.close()
-            self._confs.note("close")
+            for _ in range(1 + (self._nested.pop() if self._nested else 0)):
+                flow.close()
+                self._confs.note("close")
         elif word in {"if", "elseif", "while", "for", "test", "case", "default", "else"}:
             return self._branch(reader, word)
         elif word == "%" or (word in {"version", "language"} and reader.peek(1) == ":"):
@@ -173,6 +177,7 @@ class RapidReading:
     def _begin(self, reader: Reader) -> None:
         word = name = reader.take().text.lower()
         self._flow.restart()
+        self._nested.clear()
         while not reader.done and reader.peek() != "(" and reader.kind() == "name":
             name = reader.take().text.lower()
             if word in {"proc", "trap", "module"}:
@@ -199,26 +204,40 @@ class RapidReading:
             condition.append(token)
         self._mention(condition, READ)
         if word in {"elseif", "else", "case", "default"}:
-            flow.otherwise(last=word in {"else", "default"})
-            self._confs.note("last" if word in {"else", "default"} else "else")
+            self._otherwise(condition, last=word in {"else", "default"})
         else:
+            self._run_functions(condition)
+            self._nested.append(0)
             flow.open(loop=word in {"while", "for"})
             self._confs.note("loop" if word in {"while", "for"} else "if")
         return True
 
+    def _otherwise(self, condition: Sequence[Token], *, last: bool) -> None:
+        """Another branch; where its condition runs what may move the arm, all that follows is within it."""
+        nested = not last and self._nested != [] and not self._harmless.issuperset(called(condition))
+        self._flow.otherwise(last=last or nested)
+        self._confs.note("last" if last or nested else "else")
+        if nested:
+            self._run_functions(condition)
+            self._nested[-1] += 1
+            self._flow.open(loop=False)
+            self._confs.note("if")
+
     def _short_if(self, reader: Reader) -> None:
-        """IF condition instruction; the instruction may or may not be executed."""
-        behind = instruction_place(reader.rest())
-        self._mention([reader.take() for _ in range(behind)], READ)
-        state = self._flow.state
-        self._flow.jump()
-        self._confs.note("if")
-        if reader.peek() == "if":
-            self._short_if(reader)
-        elif not reader.done:
+        """IF condition instruction; the instruction, another IF too, may or may not be executed."""
+        states = []
+        while reader.peek() == "if":
+            condition = [reader.take() for _ in range(instruction_place(reader.rest()))]
+            self._mention(condition, READ)
+            self._run_functions(condition)
+            states.append(self._flow.state)
+            self._flow.jump()
+            self._confs.note("if")
+        if not reader.done:
             self._statement(reader)
-        self._confs.note("close")
-        self._flow.state = _joined(state, self._flow.state)
+        for state in reversed(states):
+            self._confs.note("close")
+            self._flow.state = _joined(state, self._flow.state)
         self._flow.jump()
         while not reader.done:
             reader.take()
@@ -228,6 +247,7 @@ class RapidReading:
     def _statement(self, reader: Reader) -> None:
         at, word = reader.offset, reader.peek()
         found = reader.rest()
+        self._run_functions(found[1:])
         if word in INSTRUCTIONS:
             self._motion(at, INSTRUCTIONS[word], arguments(found[1:]))
         elif word.startswith(("pdisp", "eoffs")):
@@ -256,9 +276,20 @@ class RapidReading:
                 self._leave(at, "an instruction that is not known here", motions_named(word))
             else:
                 self._confs.note("call", word)
-            self._flow.jump()
-            if self._displaces:
-                self._flow.state = replace(self._flow.state, problem=DISPLACED)
+            self._run()
+
+    def _run(self) -> None:
+        """Something runs that may move the arm, and displace what comes after."""
+        self._flow.jump()
+        if self._displaces:
+            self._flow.state = replace(self._flow.state, problem=DISPLACED)
+
+    def _run_functions(self, found: Sequence[Token]) -> None:
+        """The functions that an expression calls run before what it is in."""
+        for name in called(found):
+            if name not in self._harmless:
+                self._confs.note("call", name)
+                self._run()
 
     def _mention(self, found: Sequence[Token], reason: str, receiver: str = "") -> None:
         """Variables are used for something else than a motion; `receiver` as for `given`."""

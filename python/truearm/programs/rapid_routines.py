@@ -5,46 +5,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.rapid_values import OPERATORS, split
+from truearm.programs.rapid_functions import NO_FUNCTIONS, PURE
+from truearm.programs.rapid_values import split
 
 BEGINNINGS: Final = frozenset({"proc", "func", "trap"})
 ENDINGS: Final = frozenset({"endproc", "endfunc", "endtrap"})
 BY_REFERENCE: Final = frozenset({"inout", "var", "pers"})
-NO_FUNCTIONS: Final = OPERATORS | {"if", "elseif", "while", "test", "from", "to", "step", "return"}
-READING: Final = frozenset(
+READING: Final = PURE | frozenset(
     {
-        "abs",
-        "calcjointt",
-        "calcrobt",
-        "cjointt",
-        "cpos",
-        "crobt",
-        "ctool",
-        "cwobj",
-        "defdframe",
-        "defframe",
-        "dim",
-        "distance",
-        "dotprod",
-        "eulerzyx",
-        "ispers",
-        "isvar",
-        "mirpos",
-        "norient",
-        "numtostr",
-        "offs",
-        "orientzyx",
-        "orobt",
-        "poseinv",
-        "posemult",
-        "posevect",
-        "present",
-        "reltool",
-        "round",
-        "sqrt",
-        "trunc",
-        "valtostr",
-        "vectmagn",
         # Instructions whose targets are not followed, and which leave tools and work objects as they are.
         "arcc1",
         "arcc2",

@@ -96,8 +96,17 @@ def aggregate(reader: Reader, depth: int = 0) -> Aggregate:
 
 
 def arguments(found: Sequence[Token]) -> list[Argument]:
-    """The arguments of an instruction, split at commas that stand in no bracket."""
-    return [_argument(part) for part in split(found, ",")]
+    r"""The arguments of an instruction, split at commas that stand in no bracket.
+
+    A comma before optional ones means nothing: tG,\WObj:=wT is tG\WObj:=wT.
+    """
+    given: list[Argument] = []
+    for argument in map(_argument, split(found, ",")):
+        if given and not argument.tokens:
+            given[-1].options.update(argument.options)
+        else:
+            given.append(argument)
+    return given
 
 
 def split(found: Sequence[Token], *marks: str) -> list[tuple[Token, ...]]:

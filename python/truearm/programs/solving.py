@@ -263,7 +263,7 @@ class _Solver:
         """Digits (n, D) of targets' configuration data, ANY where open; None where no target has any."""
         configuration, wanted = self.program.configuration, None
         for number, layout in enumerate(self.program.layouts):
-            count = getattr(layout, "configuration", 0)
+            count = layout.configuration
             here = self.program.targets.layout[some] == number
             if configuration is None or count == 0 or not here.any():
                 continue

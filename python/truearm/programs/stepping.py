@@ -61,7 +61,7 @@ def written(value: float, decimals: int) -> str:
 def copied(program: Program, step: LinearStep, text: str, at: int) -> str:
     """The text of a target, which begins at offset `at`, with the numbers of a waypoint in their places."""
     targets, target = program.targets, target_of(program, step)
-    known = getattr(program.layouts[int(targets.layout[target])], "words", {})
+    known = program.layouts[int(targets.layout[target])].words
     columns = np.arange(len(step.values))
     places = int(targets.first[target]) + columns
     starts, ends = targets.starts[places] - at, targets.ends[places] - at

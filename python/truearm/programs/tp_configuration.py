@@ -12,9 +12,9 @@ pass the upper arm: of readings a turn apart, that within half a turn of the str
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -38,19 +38,13 @@ FIRST_LETTER: Final = 6
 
 @dataclass(frozen=True)
 class ConfiguredPose(EulerPose):
-    """X Y Z W P R, three letters and three turn numbers.
+    """X Y Z W P R, three letters and three turn numbers."""
 
-    Attributes:
-        words: What each letter can be, by column.
-    """
-
+    words: ClassVar[Mapping[int, tuple[str, ...]]] = MappingProxyType(
+        {FIRST_LETTER + place: tuple(letters) for place, letters in enumerate(LETTERS)}
+    )
     columns: tuple[int, int, int] = (2, 1, 0)
     configuration: int = COLUMNS
-    words: Mapping[int, tuple[str, ...]] = field(
-        default_factory=lambda: MappingProxyType(
-            {FIRST_LETTER + place: tuple(letters) for place, letters in enumerate(LETTERS)}
-        )
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,17 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite
 from typing import Final
 
 from truearm.programs.program import LineCount
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Number
-from truearm.programs.tp_configuration import LETTERS
+from truearm.programs.tp_configuration import LETTERS, MOST_TURNS
 
 JOINTS, POSE = 0, 1
 _SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
-_POSITION: Final = re.compile(r"^P\[(\d+)(?::[^\]\r\n]*)?\]\s*\{(.*?)^\s*\};?", re.MULTILINE | re.DOTALL)
+_POSITION: Final = re.compile(r"^P\[(\d{1,9})(?::[^\]\r\n]*)?\]\s*\{(.*?)^\s*\};?", re.MULTILINE | re.DOTALL)
 _OPENING: Final = re.compile(r"^P\[(\d+)", re.MULTILINE)
 _GROUP: Final = re.compile(r"\bGP(\d+)\s*:")
 _FIELD: Final = re.compile(
@@ -21,6 +22,9 @@ _FIELD: Final = re.compile(
 _FRAME: Final = re.compile(r"\b(UF|UT)\s*:\s*(\d+|F)\b")
 _CONFIG: Final = re.compile(
     r"\bCONFIG\s*:\s*'\s*(\w)\s*(\w)\s*(\w)\s*,\s*([+-]?\d+)\s*,\s*([+-]?\d+)\s*,\s*([+-]?\d+)\s*'"
+)
+_NO_CONFIG: Final = (
+    f"its CONFIG is not three letters N/F U/D T/B and three turn numbers of at most {MOST_TURNS}"
 )
 _CARTESIAN: Final = "XYZWPR"
 CURRENT: Final = "F"
@@ -112,9 +116,7 @@ def _position(text: str, found: re.Match[str], joint_count: int) -> Position:
     if not problem:
         numbers = tuple(_number(fields[name]) for name in names)
         digits = _digits(config) if cartesian else ()
-        problem = (
-            "" if digits is not None else "its CONFIG is not three letters N/F U/D T/B and three turn numbers"
-        )
+        problem = "" if digits is not None else _NO_CONFIG
         numbers = (ABSENT,) * width if digits is None else numbers + digits
     return Position(
         int(found.group(1)),
@@ -146,11 +148,16 @@ def _problem(fields: dict[str, re.Match[str]], names: list[str], joint_count: in
     missing = [name for name in names if name not in fields]
     if missing:
         return f"it does not state {missing[0]}"
-    if any("*" in found.group(2) for found in fields.values()):
+    return next((why for name, found in fields.items() if (why := _why_unreadable(name, found))), "")
+
+
+def _why_unreadable(name: str, found: re.Match[str]) -> str:
+    """Why a number is none in mm and deg; empty if it is one."""
+    if "*" in found.group(2):
         return "it is not taught"
-    if any(_unit(name) != (found.group(5) or _unit(name)) for name, found in fields.items()):
-        return "it is not in mm and deg"
-    return ""
+    if not isfinite(float(found.group(2))):
+        return f"its {name} is too large for a number"
+    return "" if found.group(5) in {None, _unit(name)} else "it is not in mm and deg"
 
 
 def _unit(name: str) -> str:
@@ -174,4 +181,4 @@ def _digits(config: re.Match[str] | None) -> tuple[Number, ...] | None:
             return None
         letters.append(Number(*config.span(place), float(index), 0))
     turned = [Number(*config.span(place), float(config.group(place)), 0) for place in (4, 5, 6)]
-    return (*letters, *turned)
+    return (*letters, *turned) if all(abs(number.value) <= MOST_TURNS for number in turned) else None

@@ -13,16 +13,17 @@ from truearm.programs.frames import Frames
 from truearm.programs.gathered import Gathered
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Number
+from truearm.programs.tp_calls import may_leave
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
 from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, line_count, positions, section
 from truearm.programs.tp_registers import StatedFrames
-from truearm.programs.tp_state import JUMPS, OFFSET, SENSED, Current, moved_at
+from truearm.programs.tp_state import OFFSET, SENSED, Current, moved_at
 from truearm.robot import Robot
 from truearm.types import Floats
 
 _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
-_TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
+_TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d{1,9}(?!\d)|A?R\[\d+[^\]]*\])[^\]]*\]")
 _COMMENT: Final = re.compile(r":[^\[\]\n]*(?=\])")
 _ASSIGNED: Final = re.compile(r"\s*=(?!=)")
 _STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
@@ -125,7 +126,7 @@ class Reader:
         straight = True
         for at, text in self._statements():
             self._current.read(self._source.place(at)[0], text, straight=straight)
-            straight = straight and _MOTION.match(text) is None and JUMPS.match(text) is None
+            straight = straight and _MOTION.match(text) is None and not may_leave(text)
 
     def _motions(self) -> None:
         follows = False
@@ -134,7 +135,7 @@ class Reader:
             self._stated.read(text)
             if motion is None:
                 self._other_use(at, text)
-                follows = follows and JUMPS.match(text) is None
+                follows = follows and not may_leave(text)
             else:
                 follows = self._motion(at, text, motion.group(1), follows=follows)
         self._settle()

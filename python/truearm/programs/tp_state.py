@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from truearm.programs.tp_calls import may_call
+
 KINDS: Final = ("UFRAME", "UTOOL")
-JUMPS: Final = re.compile(r"\s*(LBL|JMP|IF|ELSE|ENDIF|FOR|ENDFOR|SELECT|CALL|RUN|SKIP)\b|.*\b(JMP|CALL)\b")
 _NAMED: Final = re.compile("|".join(KINDS), re.IGNORECASE)
 _SET: Final = re.compile(
     r"(?P<name>[\w$.]*(?P<kind>UFRAME|UTOOL)\w*)\s*"
@@ -16,7 +17,6 @@ _SET: Final = re.compile(
 _OF_GROUP: Final = re.compile(r"\s*GP(\d+)\s*:?", re.IGNORECASE)
 _NUMBER: Final = re.compile(r"\s*(\d+)\s*(?::.*|\Z)")
 _SYSTEM_INDEX: Final = re.compile(r"\s*(\d+)\s*(?:,(.*))?\Z")
-_CALLED: Final = re.compile(r"\b(CALL|RUN)\b")
 _MOVED: Final = re.compile(r"\s*(TRACK|TOUCH\s+OFFSET|MP\s+OFFSET)\b\s*(END\b)?", re.IGNORECASE)
 _LEAVING: Final = re.compile(r"\s*(IF|ELSE|ENDIF|FOR|ENDFOR|SELECT)\b|.*\bLBL\s*\[", re.IGNORECASE)
 _CONVEYOR: Final = re.compile(r"\bLINE_TRACK_SCHEDULE_NUMBER\s*:\s*0*[1-9]")
@@ -42,7 +42,7 @@ class Current:
         """A statement of line `line`; `straight` where neither a motion nor a branch is before it."""
         for found in _SET.finditer(text) if _NAMED.search(text) is not None else ():
             self._set(line, found, straight=straight, alone=not text[: found.start()].strip())
-        if _CALLED.search(text):
+        if may_call(text):
             self._called = self._called or line
 
     def _set(self, line: int, found: re.Match[str], *, straight: bool, alone: bool) -> None:
@@ -80,7 +80,7 @@ class Current:
         if kind in self._late:
             line = self._late[kind]
             return f"{name} is set in line {line}, behind motions or branches that do not have it yet"
-        return f"the program called in line {self._called} may set {name}" if self._called else ""
+        return f"line {self._called} may call a program or macro that sets {name}" if self._called else ""
 
     def why_unknown(self, kind: str, number: str) -> str:
         """Why a frame is not the one that a frames file holds; empty if it is."""

@@ -15,7 +15,7 @@ _PLAIN: Final = re.compile(
     re.IGNORECASE,
 )
 """A motion that can be repeated: it states a speed, not a time, and nothing that is done on the way."""
-_NUMBER: Final = re.compile(r"\bP\[\s*(\d+)")
+_NUMBER: Final = re.compile(r"\bP\[\s*(\d{1,9})\b")
 _STOPS: Final = re.compile(r"FINE|CNT[ \t]*0+\Z", re.IGNORECASE)
 PASSED: Final = "CNT100"
 

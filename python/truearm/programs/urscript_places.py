@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.programs.lexing import decimals_of
 from truearm.programs.tables import Number
 from truearm.programs.urscript_constants import (
     AXES,
@@ -228,7 +229,4 @@ def _number(node: Node, place: int) -> Number:
     value = float(node.text)
     if not np.isfinite(value):
         raise RunTime(f"number {place} of it is too large")
-    mantissa, _, exponent = node.text.lower().partition("e")
-    power = int(exponent or 0)
-    decimals = max(len(mantissa.partition(".")[2]) - power, 0) if power >= 0 else 0
-    return Number(node.start, node.end, value, decimals, factor)
+    return Number(node.start, node.end, value, decimals_of(node.text), factor)

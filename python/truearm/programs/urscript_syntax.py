@@ -91,10 +91,12 @@ class Node:
     keys: tuple[str, ...] = ()
 
     def walk(self) -> Iterator["Node"]:
-        """This node and all below it."""
-        yield self
-        for part in self.parts:
-            yield from part.walk()
+        """This node and all below it, in the order of the text."""
+        pending = [self]
+        while pending:
+            node = pending.pop()
+            yield node
+            pending += reversed(node.parts)
 
 
 class NotReadable(Exception):  # noqa: N818 - not an error of the program: what it is in is listed
