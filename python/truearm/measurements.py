@@ -1,6 +1,7 @@
 """Measurements: joint readings and what was measured at them."""
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -242,8 +243,9 @@ class Measurements:
             UsageError: As for read_csv, and if a file is named twice.
         """
         files = [as_path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
-        for path in files:
-            if files.count(path) > 1:
+        places = [os.path.realpath(path) for path in files]
+        for path, place in zip(files, places, strict=True):
+            if places.count(place) > 1:
                 raise UsageError("the file is named twice", where=str(path))
         stems = [path.stem for path in files]
         names = [
@@ -299,9 +301,10 @@ class Measurements:
         another. Groups that a column names keep their names: equal names mean the same set-up. Those that
         are called after their file are set-ups of their own, as with `read_files`, and so is the fixed point
         that their distances lead to where nothing names it: files of one name are called by their folders
-        as well, and tables of one name are numbered, "data" and "data 2". Rows that were selected from the
-        same table belong to the same set-up. Of tables that were not read at once, as one that has grown or
-        the rows of a loaded calibration, it is told by the rows that both have.
+        as well. Tables of one name are numbered, "data" and "data 2", among the sources whoever names their
+        set-ups. Rows that were selected from the same table belong to the same set-up. Of tables that were
+        not read at once, as one that has grown or the rows of a loaded calibration, it is told by the rows
+        that both have.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.

@@ -10,11 +10,12 @@ from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relativ
 from truearm.doubts.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.doubts.unit_change import check_one_unit
-from truearm.errors import InputError, Notice
+from truearm.errors import InputError, Notice, list_names
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
 from truearm.rows.visits import pose_numbers
+from truearm.tables.same_tables import copied_rows
 from truearm.types import Mask
 from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
@@ -63,7 +64,8 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
     """Check that measurements can be of `robot`.
 
     Returns:
-        What the user should know: joints outside their limits, rows identical in everything.
+        What the user should know: joints outside their limits, rows that are there twice, equal readings at
+        points that lie apart.
 
     Raises:
         InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians
@@ -73,7 +75,13 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
     outside = check_readings(measurements, robot)
     _check_alike(measurements)
     check_points(measurements, robot)
-    return [*measurements.notices, *outside, *_repetitions(measurements), *_apart_at_equal(measurements)]
+    return [
+        *measurements.notices,
+        *outside,
+        *_repetitions(measurements),
+        *_copies(measurements),
+        *_apart_at_equal(measurements),
+    ]
 
 
 def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
@@ -395,3 +403,16 @@ def _repetitions(measurements: Measurements) -> list[Notice]:
         return []
     message = f"Identical to an earlier row in everything, counted once: {measurements.row_names(repeated)}."
     return [Notice("identical_rows", message, tuple(measurements.rows[repeated].tolist()))]
+
+
+def _copies(measurements: Measurements) -> list[Notice]:
+    copied = copied_rows(measurements)
+    if not copied.any():
+        return []
+    names = list_names(measurements.select(copied).groups)
+    message = (
+        f"Set-up {names} holds rows that another one holds as well, with all their digits, and that count "
+        f"twice: {measurements.row_names(copied)}. What was measured once tells no more under two names, and "
+        "standard errors are too small by it: leave one of the files out, or the rows that both hold."
+    )
+    return [Notice("copied_rows", message, tuple(measurements.rows[copied].tolist()))]
