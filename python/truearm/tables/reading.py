@@ -192,7 +192,7 @@ def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers |
         if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
             columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.object_)
+            columns[str(name)] = column.astype(str).where(column.notna(), "").to_numpy(dtype=np.object_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
     return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
@@ -415,7 +415,7 @@ def _in_words(number: float) -> str:
     """A number as a name: whole ones without a point, NaN as nothing."""
     if np.isnan(number):
         return ""
-    return str(int(number)) if number == int(number) else repr(number)
+    return str(int(number)) if number.is_integer() else repr(number)
 
 
 def as_number(text: str) -> float | None:
