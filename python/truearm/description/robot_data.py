@@ -87,7 +87,8 @@ class RobotData:
     def _row_of_base(self, row: Floats) -> Floats | None:
         """The row (5,) that the base was given as; None where the base is another one by now."""
         row = _checked("base_row", row, (5,))
-        return row if np.allclose(row_transform(row, self.convention), self.base, rtol=0.0, atol=SAME) else None
+        made = row_transform(row, self.convention)
+        return row if np.allclose(made, self.base, rtol=0.0, atol=SAME) else None
 
     @property
     def joint_count(self) -> int:

@@ -14,6 +14,7 @@ from truearm.errors import InputError, Notice, list_names
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
+from truearm.rows.used_distances import holds_distances
 from truearm.rows.visits import pose_numbers
 from truearm.tables.same_tables import copied_rows
 from truearm.types import Mask
@@ -69,10 +70,11 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
 
     Raises:
         InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians
-            or the other way round, millimetres as metres or the other way round, inches as either, or all
-            poses are alike.
+            or the other way round, millimetres as metres or the other way round, inches as either, all poses
+            are alike, or only one row of a pair is there.
     """
     outside = check_readings(measurements, robot)
+    _check_whole_pairs(measurements)
     _check_alike(measurements)
     check_points(measurements, robot)
     return [
@@ -118,6 +120,21 @@ def check_points(measurements: Measurements, robot: Robot) -> None:
     check_angles(measurements, robot)
     _check_far(measurements, NO_REACH_M)
     _check_distances(measurements, robot)
+
+
+def _check_whole_pairs(measurements: Measurements) -> None:
+    """Raise InputError where distances are used and the other row of a pair was left behind."""
+    if measurements.pair is None or not holds_distances(measurements):
+        return
+    _, index, count = np.unique(measurements.pair, return_inverse=True, return_counts=True)
+    alone = (measurements.pair != "") & (count[index.reshape(-1)] < 2)
+    if alone.any():
+        raise InputError(
+            f"the other row of the pair is not there in {measurements.row_names(alone)}",
+            where=", ".join(measurements.files),
+            rule="The distance of a pair takes both of its rows",
+            way_out="Select both rows of a pair, or neither",
+        )
 
 
 def _check_far(measurements: Measurements, most: float) -> None:
