@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers, as_row_numbers, read_only
+from truearm.arrays import as_numbers, as_row_numbers, check_columns, read_only
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import count as whole_number
@@ -112,7 +112,8 @@ class Measurements:
                 array = _as_array(name, value)
                 object.__setattr__(self, name, read_only(array))
                 self._check_length(name, array)
-        self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
+        check_columns(required(self.features, pd.DataFrame, "the table of features"), where="features")
+        self._check_length("features", self.features)
         object.__setattr__(self, "features", self.features.reset_index(drop=True))
 
     def __len__(self) -> int:
