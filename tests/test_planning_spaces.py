@@ -102,7 +102,7 @@ def test_a_configuration_is_kept(arm, elbow):
 
 def test_a_configuration_that_held_joints_rule_out_is_refused():
     robot, corners = Robot.load("ur10"), (np.array([0.4, -0.3, 0.2]), np.array([0.8, 0.3, 0.6]))
-    held = [0.0, 0.0, 0.0, 0.0, -0.5, 0.0]
+    held = np.array([0.0, 0.0, 0.0, 0.0, -0.5, 0.0])
     flipped = CartesianSpace(robot, *corners, configuration=Configuration(wrist="flip"), held=held)
     assert len(draw_pool(flipped, 5)) == 5
     with pytest.raises(UsageError, match="joints 1, 2 and 3 have wrist noflip.*held = "):
