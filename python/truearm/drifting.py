@@ -29,7 +29,7 @@ from truearm.units import MM_PER_METRE
 
 FEWEST_ROWS: Final = 30
 """Training rows of a set-up, at the least, that are asked for a drift: fewer have shown none."""
-OVERWHELMING: Final = 10.0
+LEAST_EVIDENCE: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.1
 """A drift, or a change of one, of a smaller root mean square, in deviations of what is left, is let be."""
@@ -162,7 +162,7 @@ def _drift_of(
             trust = means(weight[own], visits, weight[own])
             wanted = np.concatenate([before.progress[every], times])
             found, noise, steps, gain = find_drift(known, seen, trust, wanted, most_steps)
-            if gain <= OVERWHELMING:
+            if gain <= LEAST_EVIDENCE:
                 found, steps = np.zeros_like(found), []
             change = found[len(every) :] - before.moved[train[own]]
             if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:

@@ -23,10 +23,10 @@ from truearm.joined_tables import join_tables
 from truearm.measurements import Measurements
 from truearm.named_values import JOINT
 from truearm.tables.columns import (
-    DISTANCE,
+    DISTANCE_COLUMN,
     QUATERNION,
-    SIGMA,
-    TARGET,
+    SIGMA_COLUMN,
+    TARGET_COLUMN,
     WORDS,
     MissingColumnError,
     StatedUnits,
@@ -179,7 +179,7 @@ def _by_target(
     """Columns of points with those of further targets: x2, y2, z2 for rows whose target is 2, and so on."""
     which = np.asarray(columns[WHICH], dtype=np.float64)
     others = {name: values for name, values in columns.items() if name != WHICH}
-    several = [name for name in others if TARGET.fullmatch(name) and name not in POINT]
+    several = [name for name in others if TARGET_COLUMN.fullmatch(name) and name not in POINT]
     if several or not set(POINT) <= set(others):
         raise UsageError(
             f"there {'are columns of several points' if several else 'is no point'}",
@@ -208,7 +208,11 @@ def _by_target(
 
 def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:
     """The rows in which something was measured if there are any, and in words those in which nothing was."""
-    places = [name for name in frame.columns if TARGET.fullmatch(str(name)) or DISTANCE.fullmatch(str(name))]
+    places = [
+        name
+        for name in frame.columns
+        if TARGET_COLUMN.fullmatch(str(name)) or DISTANCE_COLUMN.fullmatch(str(name))
+    ]
     measured = frame[places].notna().any(axis=1)
     if measured.all() or not measured.any():
         return frame, []
@@ -442,14 +446,14 @@ def _check_is_ours(ours: str) -> None:
 
 def _is_ours(name: str) -> bool:
     """Whether a name, without unit, is one of a measurement column."""
-    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET, SIGMA, DISTANCE))
+    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET_COLUMN, SIGMA_COLUMN, DISTANCE_COLUMN))
     has_unit = any(name.endswith(f"_{unit}") for unit in UNITS)
     return name in QUATERNION + WORDS or (any(matches) and not has_unit)
 
 
 def _order(ours: str) -> tuple[int, int, str]:
     """Joints, targets, quaternion, then the rest."""
-    joint, target = JOINT.fullmatch(ours), TARGET.fullmatch(ours)
+    joint, target = JOINT.fullmatch(ours), TARGET_COLUMN.fullmatch(ours)
     if joint:
         return 0, int(joint[1]), ""
     if target:

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts.mixed_units import check_mixed_units
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit
 from truearm.doubts.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.doubts.unit_change import check_one_unit
@@ -14,6 +14,7 @@ from truearm.errors import InputError, Notice, list_names
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
 from truearm.rows.used_distances import holds_distances
 from truearm.rows.visits import pose_numbers
 from truearm.tables.same_tables import copied_rows
