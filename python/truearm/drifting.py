@@ -124,13 +124,13 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     for look in range(MOST_LOOKS):
         rough = fit_rows(task, drift.taken_out(data).select(some), known).after(rough)
         known = KnownHyper(near=rough.variable, rough=True)
-        found = _drift_of(task, rough, drift, (data, some), most_steps=look + 1)
+        found = _drift_of(task, rough, drift, data, some, most_steps=look + 1)
         if found is None:
             break
         drift = found
     fits = fit_rows(task, drift.taken_out(data).select(train), replace(known, rough=False)).after(rough)
     # Waves and gross rows, which only the finished fit is without, may have hidden one from the rough ones.
-    found = None if drift else _drift_of(task, fits, drift, (data, train), most_steps=MOST_LOOKS)
+    found = None if drift else _drift_of(task, fits, drift, data, train, most_steps=MOST_LOOKS)
     if found is not None:
         drift = found
         fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable)).after(fits)
@@ -138,15 +138,13 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
 
 
 def _drift_of(
-    task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows], *, most_steps: int
+    task: Task, fits: Fits, before: Drift, data: Measurements, train: Rows, *, most_steps: int
 ) -> Drift | None:
-    """The drift that the variable fit shows; None where it is that which it was made without, or next to it.
-
-    `rows` are all rows and those of them that were fitted.
+    """The drift that the fit to the rows `train` shows; None where it is that which it was made without, or
+    next to it.
     """
     if fits.variable is None:
         return None
-    data, train = rows
     left, weight = _residuals_in_world(task, fits.variable, data.select(train))
     left += before.moved[train]
     moved, jumps = before.moved.copy(), dict(before.jumps)
