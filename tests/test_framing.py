@@ -179,6 +179,10 @@ def test_measured_poses_that_do_not_tell_the_tool_are_refused(exact, tmp_path):
     assert np.abs(find_tool(model, poses_of(robot, free, tmp_path / "3.csv")).transform - TOOL).max() < 1e-7
     with pytest.raises(WorkError, match="2 measured poses of the tool tell no more than is unknown"):
         find_tool(model, poses_of(robot, free[:2], tmp_path / "2.csv"))
+    some = poses_of(robot, free, tmp_path / "some.csv")
+    turns = np.where(np.arange(3)[:, None] == 0, some.orientations, np.nan)
+    with pytest.raises(WorkError, match="3 measured poses of the tool tell no more than is unknown"):
+        find_tool(model, replace(some, orientations=turns))
     parallel = np.tile(middle, (8, 1))
     parallel[:, 1:3] += np.linspace([-0.6, 0.4], [0.6, -0.4], 8) ** [1, 3]
     with pytest.raises(WorkError, match="measured poses hardly turn the flange's direction"):
@@ -239,6 +243,9 @@ def test_lists_of_measurements_are_put_together(exact, tmp_path):
     parts = [data.select(range(4)), data.select(range(4, 8))]
     whole, parted = (find_tool(model, given, orientation=TOOL[:3, :3]) for given in (data, parts))
     np.testing.assert_array_equal(parted.transform, whole.transform)
+    for names in (["a"] * 7, ["a"] * 9, []):
+        with pytest.raises(UsageError, match=f"points: {len(names)} names of points. There are 8 touches"):
+            find_tool(model, data, orientation=np.eye(3), points=names)
     with pytest.raises(InputError, match="no place x, y, z of every touched point"):
         find_object(model, parts, TOOL)
 
@@ -258,6 +265,9 @@ def test_too_little_is_refused(exact, tmp_path):
         find_tool(model, data, orientation=np.eye(4))
     with pytest.raises(InputError, match="the entries of the orientation hold NaN"):
         find_tool(model, data, orientation=np.full((3, 3), np.nan))
+    for names in (["a"] * 7, ["a"] * 9, []):
+        with pytest.raises(UsageError, match=f"points: {len(names)} names of points. There are 8 touches"):
+            find_tool(model, data, orientation=np.eye(3), points=names)
     with pytest.raises(InputError, match="no place x, y, z of every touched point"):
         find_object(model, data, TOOL)
     places = dict(zip(["x_m", "y_m", "z_m"], np.outer([1, 2, 3, 4, 5, 6, 7, 8], [0.1, 0, 0]).T, strict=True))
@@ -266,6 +276,11 @@ def test_too_little_is_refused(exact, tmp_path):
         find_object(model, line, TOOL)
     with pytest.raises(WorkError, match="2 points"):
         find_object(model, line.select(range(2)), TOOL)
+    with pytest.raises(InputError, match="the entries of the covariance hold NaN"):
+        find_object(model, line, TOOL, np.full((3, 3), np.nan))
+    for wrong in (-np.eye(3), np.triu(np.ones((3, 3)))):
+        with pytest.raises(InputError, match="the covariance is none. It is symmetric"):
+            find_object(model, line, TOOL, wrong)
 
 
 def placed(robot, tmp_path, places, stated, seed=5):

@@ -1,6 +1,7 @@
 """Sheets as instruments write them: units below the names, and numbers that say that nothing was measured."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import import_table
+from truearm.tables.raw_tables import Marks
 
 HEAD, FIRST, *REST = PLAIN.splitlines(keepends=True)
 MAPS = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
@@ -66,3 +68,43 @@ def test_what_no_cell_says_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
     (notice,) = json.loads(out)["notices"]
     assert notice.endswith("says what --missing -999 says")
     assert "--missing -999" in err
+
+
+@pytest.mark.parametrize(
+    ("cells", "why"),
+    [
+        (("20.5", "n/a"), 'holds "n/a" in row 2.*--missing TEXT'),
+        (("20.5", "inf"), "holds NaN or infinite values in row 2"),
+        (('"20,5"', '"21,5"'), 'holds "20,5".*--decimal ","'),
+        (("warm", "cold"), ""),
+        (("20.5", "21.5"), ""),
+    ],
+)
+def test_kept_numbers_that_become_text_are_told(cells: tuple[str, str], why: str, tmp_path: Path) -> None:
+    lines = PLAIN.splitlines()
+    lines = [f"{line},{cell}" for line, cell in zip(lines, ("T", *cells), strict=True)]
+    notices = import_table(write(tmp_path, "\n".join(lines)), plan(keep={"temperature": "T"})).notices
+    assert [notice.kind for notice in notices] == ["kept_as_text"] * bool(why)
+    for notice in notices:
+        assert re.search(f'"temperature" is kept as text.*"T" {why}', notice.message)
+
+
+def test_numbers_are_shown_as_they_are_written(tmp_path: Path) -> None:
+    text = "J1;J2;px;py;pz\n1,5;2;1,234,5;2;3\n"
+    with pytest.raises(InputError, match='"px" holds "1,234,5" in row 1. A number has one mark'):
+        import_table(write(tmp_path, text), plan(delimiter=";", decimal=","))
+
+
+def test_words_that_are_stated_for_one_of_two_tables_are_told_if_no_cell_says_them(tmp_path: Path) -> None:
+    points = tmp_path / "second.txt"
+    points.write_text("px,py,pz,note\n1,2,3,no\n4,5,6,\n")
+    first = write(tmp_path, "J1,J2\n90,45\n-90,0\n")
+    for ours, theirs, unsaid in (
+        (("n/a",), ("n/a", "-9"), "n/a -9"),
+        ((), ("-9",), "-9"),
+        (("-9",), (), "-9"),
+        (("no",), ("no",), ""),
+    ):
+        both = plan(second=points, second_marks=Marks(missing=theirs), missing=ours)
+        found = [notice.message for notice in import_table(first, both).notices]
+        assert " ".join(message.split()[-2] for message in found) == unsaid

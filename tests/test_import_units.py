@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from tests.import_support import COLUMNS, PLAIN, plan, write
-from truearm.importing import import_table
+from truearm.errors import UsageError
+from truearm.importing import ImportPlan, import_table
 from truearm.units import to_si, unit_in_header
 
 
@@ -59,3 +60,39 @@ def test_a_column_is_of_a_unit_that_the_others_are_not(
 
 def test_units_of_columns_are_exact() -> None:
     assert [to_si(4.5, unit) for unit in ("um", "mm", "cm", "mrad")] == [4.5e-6, 4.5e-3, 4.5e-2, 4.5e-3]
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "words"),
+    [
+        (
+            "q1_deg,x_mm,y_mm,z_mm\ndeg,m,m,m\n10,1,2,3\n",
+            None,
+            '"x_mm" says mm, the row of units below it says m.* --map x=x_mm:mm or --map x=x_mm:m',
+        ),
+        (
+            "q1_deg,x (mm),y_mm,z_mm\ndeg,m,mm,mm\n10,1,2,3\n",
+            "m",
+            r'"x \(mm\)" says mm, the row of units below it says m',
+        ),
+        ("q1_deg,x_in,y_in,z_in\n10,1,2,3\n", "mm", '"x_in" says in, --length-unit says mm.*x=x_in:in or'),
+    ],
+)
+def test_names_of_columns_are_held_against_what_else_says_units(
+    text: str, stated: str | None, words: str, tmp_path: Path
+) -> None:
+    path, columns = write(tmp_path, text + text.splitlines()[-1]), {}
+    if "(mm)" in text:
+        columns = {"x": "x (mm)"}
+    with pytest.raises(UsageError, match=words):
+        import_table(path, ImportPlan(columns=columns, length_unit=stated))
+    names = text.partition("\n")[0].split(",")[1:]
+    right = dict(zip("xyz", (f"{name}:m" for name in names), strict=True))
+    assert import_table(path, ImportPlan(columns=right, length_unit=stated)).frame["x"].tolist() == [1.0, 1.0]
+
+
+def test_inches_in_names_alone_are_taken(tmp_path: Path) -> None:
+    path = write(tmp_path, "q1_deg,x_in,y_in,z_in\n10,1,2,3\n11,1,2,3\n")
+    for stated in (None, "in"):
+        frame = import_table(path, ImportPlan(length_unit=stated)).frame
+        assert frame["x"].tolist() == [0.0254, 0.0254]

@@ -441,6 +441,7 @@ def test_arrays_of_any_kind_make_the_same_measurements() -> None:
         ("sigma_m", 1e-4, r"sigma_m: shape \(\). It must be \(n,\)"),
         ("group", "a", r"group: shape \(\). It must be \(n,\)"),
         ("rows", [1.0, 2.0, 3.0], "rows: values of type float64. They must be whole numbers"),
+        ("features", pd.DataFrame({"n": ["x"] * 3}), 'features: column "n" of type .* Columns hold numbers'),
     ],
 )  # fmt: skip
 def test_arrays_of_another_shape_are_told_theirs(name: str, value: object, words: str) -> None:

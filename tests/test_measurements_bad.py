@@ -245,3 +245,29 @@ def test_bad_data_frames() -> None:
         Measurements.from_dataframe(good.assign(q1=[np.nan, 1.0]))
     with pytest.raises(InputError, match="two columns have the same name"):
         Measurements.from_dataframe(pd.concat([good, good[["x"]]], axis=1))
+
+
+@pytest.mark.parametrize(
+    "gaps",
+    [
+        pd.to_datetime(pd.Series(["2026-01-01", None])),
+        pd.to_timedelta(pd.Series([1.0, None]), unit="s"),
+        pd.Series(pd.PeriodIndex(["2026-01", None], freq="M")),
+        pd.Series(pd.Categorical(["a", None])),
+    ],
+    ids=lambda gaps: str(gaps.dtype),
+)
+def test_gaps_of_any_type_of_column_are_empty_cells(gaps: pd.Series) -> None:
+    good = pd.DataFrame({"q1": [0.0, 1.0], "x": [1.0, 2.0], "y": [1.0, 2.0], "z": [1.0, 2.0]})
+    data = Measurements.from_dataframe(good.assign(note=gaps))
+    assert [notice.message for notice in data.notices] == ['data: left out, as not numeric: "note".']
+    with pytest.raises(InputError, match='column "group" is empty in row 2'):
+        Measurements.from_dataframe(good.assign(group=gaps))
+
+
+def test_infinite_numbers_of_other_columns_do_not_hide_what_is_wrong() -> None:
+    table = pd.DataFrame({"q1": ["n/a", "0"], "x": [1.0, 2.0], "y": 1.0, "z": 2.0, "load": [np.inf, 1.0]})
+    with pytest.raises(InputError, match='column "q1" holds "n/a" in row 1'):
+        Measurements.from_dataframe(table)
+    named = table.assign(q1=0.0, group=table["load"], load=0.0)
+    assert Measurements.from_dataframe(named).groups == ["inf", "1"]

@@ -441,3 +441,15 @@ def test_a_reading_that_no_joint_can_have() -> None:
     rows.loc[3, "q2"] = 1e308
     with pytest.raises(InputError, match=r"joint 2 reads up to 1e\+308 rad in row 4"):
         check_against(Measurements.from_dataframe(rows), robot)
+
+
+def test_half_a_pair_is_refused() -> None:
+    robot = Robot.load("ur10")
+    q = readings(robot)
+    frame = pd.DataFrame({f"q{k + 1}": q[:, k] for k in range(6)})
+    pair = np.arange(len(q)) // 2
+    data = Measurements.from_dataframe(frame.assign(pair=pair.astype(str), distance=0.5 + 0.01 * pair))
+    whole = data[: len(q) - 2]
+    assert check_against(whole, robot) == []
+    with pytest.raises(InputError, match=r"the other row of the pair is not there in rows 1 and 6\."):
+        check_against(whole[[k not in (1, 4) for k in range(len(whole))]], robot)

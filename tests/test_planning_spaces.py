@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from truearm.description.library import library_names
 from truearm.errors import InputError, UsageError, WorkError
+from truearm.planning import positioning
 from truearm.planning.accessibility import (
     AboveFloor,
     InBox,
@@ -99,6 +100,21 @@ def test_a_configuration_is_kept(arm, elbow):
     assert not any(other.holds(robot, readings[reached]).any() for other in others)
 
 
+def test_a_configuration_that_held_joints_rule_out_is_refused():
+    robot, corners = Robot.load("ur10"), (np.array([0.4, -0.3, 0.2]), np.array([0.8, 0.3, 0.6]))
+    held = np.array([0.0, 0.0, 0.0, 0.0, -0.5, 0.0])
+    flipped = CartesianSpace(robot, *corners, configuration=Configuration(wrist="flip"), held=held)
+    assert len(draw_pool(flipped, 5)) == 5
+    with pytest.raises(UsageError, match="joints 1, 2 and 3 have wrist noflip.*held = "):
+        draw_pool(CartesianSpace(robot, *corners, configuration=Configuration(wrist="noflip"), held=held), 5)
+
+
+def test_two_known_poses_are_enough_to_start_from(monkeypatch):
+    monkeypatch.setattr(positioning, "STARTS", 2)
+    space = CartesianSpace(RV_M2, np.array([0.2, 0.2, 0.2]), np.array([0.4, 0.4, 0.4]))
+    assert space.readings(space.low[None])[0].shape == (1, 5)
+
+
 def test_unknown_branch_is_refused():
     with pytest.raises(UsageError, match="front or back"):
         Configuration(arm="left")  # type: ignore[arg-type]
@@ -177,6 +193,16 @@ def test_the_pin_must_meet_the_panel_steeply_enough():
     readings[:, 1] = np.deg2rad([0.0, 14.0, 16.0, 90.0])
     allowed = accessible(RV_M2, readings, [LeastContactAngle((0.0, 0.0, 1.0))])
     assert allowed.tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 0.0, 0.0), (0.0, 1.0), (np.nan, 0.0, 1.0)])
+def test_directions_of_rules_lead_somewhere(wrong):
+    with pytest.raises(UsageError, match="axis is .*A direction has three finite numbers"):
+        InCone((0.0, 0.0, 0.0), wrong, 0.1)
+    with pytest.raises(UsageError, match="normal is"):
+        LeastContactAngle(wrong)
+    with pytest.raises(UsageError, match="pin is"):
+        LeastContactAngle((0.0, 0.0, 1.0), pin=wrong)
 
 
 def test_no_part_of_the_arm_may_be_in_the_box():
@@ -261,6 +287,8 @@ def test_a_pool_that_cannot_be_filled_says_so():
 def test_a_space_needs_a_box():
     with pytest.raises(UsageError, match="low"):
         JointSpace(RV_M2, low=np.array([1.0, 1.0, 1.0]), high=np.array([0.0, 2.0, 2.0]))
+    with pytest.raises(UsageError, match=r"q1 from -20 to 1 rad. The limits of the joint are -\d.* to"):
+        JointSpace(RV_M2, low=np.array([-20.0, 0.0, -1.0]), high=np.array([1.0, 1.0, 0.0]))
     with pytest.raises(UsageError, match="R, theta, phi"):
         SphericalSpace(RV_M2, np.array([0.1, 0.2]), np.array([0.3, 0.4]))
 

@@ -171,6 +171,8 @@ def test_features_are_held_in_the_middle(known):
     readings = arm.poses(10, seed=2)
     assert (Candidates(calibration, readings).values(readings)[:, -1] == 1.0).all()
     assert (Candidates(calibration, readings, features={"load": 2.0}).values(readings)[:, -1] == 2.0).all()
+    with pytest.raises(ta.UsageError, match='does not vary with "laod".*It varies with "load".*Did you mean'):
+        Candidates(calibration, readings, features={"laod": 2.0})
 
 
 def test_what_cannot_be_proposed(known, tmp_path):
@@ -179,6 +181,12 @@ def test_what_cannot_be_proposed(known, tmp_path):
         Candidates(calibration, arm.poses(5), group="other")
     with pytest.raises(ta.WorkError, match="6 poses are to be chosen from 5"):
         next_poses(Candidates(calibration, arm.poses(5)), arm.poses(5), 6)
+    for expected in (
+        lambda few: next_poses(few, np.empty((0, 5)), 2),
+        lambda few: expected_by_update(few, np.empty((0, 5)), calibration),
+    ):
+        with pytest.raises(ta.UsageError, match="the workspace has no poses"):
+            expected(Candidates(calibration, arm.poses(5)))
     calibration.save(tmp_path / "small.calib", with_rows=False)
     stripped = ta.Calibration.load(tmp_path / "small.calib")
     with pytest.raises(ta.WorkError, match="left out of this file"):

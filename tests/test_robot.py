@@ -14,6 +14,7 @@ from truearm.description.library import library_names
 from truearm.description.robot_data import Payload
 from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
+from truearm.fits.identified import IdentifiedArm
 from truearm.robot import Robot
 
 LINK = """
@@ -61,6 +62,19 @@ def test_base_given_as_a_row_is_kept_as_one() -> None:
     assert robot.base_row is not None
     np.testing.assert_allclose(robot.base_row, [np.pi / 2, 0.4, -0.08, np.pi, 0.0])
     assert arm().base_row is None
+
+
+def test_another_base_is_not_the_row_of_the_first_one() -> None:
+    robot, shift = Robot.load("RV-M2"), np.eye(4)
+    shift[:3, 3] = [0.5, 0.0, 0.2]
+    moved, q = replace(robot, base=shift @ robot.base), np.full(5, 0.1)
+    assert moved.base_row is None
+    for made in (moved, Robot.from_toml(moved.to_toml()), Robot.from_dict(moved.to_dict())):
+        np.testing.assert_allclose(made.position(q), robot.position(q) + shift[:3, 3], atol=1e-12)
+    values = moved.joints_from_readings(q[None])
+    in_world = IdentifiedArm(moved, "world").flange_chain.pose(values)
+    np.testing.assert_allclose(in_world, moved.flange_chain.pose(values), atol=1e-12)
+    assert replace(robot, name="other").base_row is not None
 
 
 def test_direction_and_coupling_make_joint_values_from_readings() -> None:

@@ -6,6 +6,7 @@ import pytest
 
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file
+from truearm.doubts.plausibility import check_against
 from truearm.simulation import VirtualArm
 from truearm.tables.same_tables import called_as_files
 
@@ -80,3 +81,36 @@ def test_set_ups_with_the_name_of_their_file() -> None:
     groups = np.array(["one", "two.csv", "x/two.csv", "lab"])
     sources = np.array(["x/one.csv", "x/two.csv", "x/two.csv", "data"])
     assert called_as_files(groups, sources).tolist() == ["one", "", "x/two.csv", ""]
+
+
+def test_tables_of_one_name_are_told_apart_where_a_column_names_the_set_ups(table: pd.DataFrame) -> None:
+    one, other = table.assign(group="a", sigma=3e-5), shifted(table).assign(group="b", sigma=3e-4)
+    both = ta.Measurements.of([read(one), read(other)])
+    assert both.groups == ["a", "b"]
+    assert both.files == ["data", "data 2"]
+    assert both.default_group is None
+    named = read(one)
+    halves = [named.select(np.arange(20, ROWS)), named.select(np.arange(30))]
+    assert ta.Measurements.of(halves).files == ["data"]
+    assert ta.Measurements.of([named[:20], named[20:], read(other, "b")]).files == ["data", "b"]
+    assert ta.Measurements.of([read(shifted(table)), named]).files == ["data", "data 2"]
+
+
+def test_a_file_is_not_read_under_two_of_its_paths(table: pd.DataFrame, tmp_path) -> None:
+    path = tmp_path / "m.csv"
+    table.to_csv(path, index=False)
+    (tmp_path / "there").mkdir()
+    with pytest.raises(ta.UsageError, match="the file is named twice"):
+        ta.Measurements.read_files([path, tmp_path / "there" / ".." / "m.csv"])
+
+
+def test_rows_that_are_there_under_two_names_are_told(arm: VirtualArm, table: pd.DataFrame) -> None:
+    extra = read(table.iloc[:30], "m copy")
+    copied = ta.Measurements.of([read(table, "m"), extra])
+    notice = next(each for each in check_against(copied, arm.robot) if each.kind == "copied_rows")
+    assert notice.rows == tuple(range(1, 31))
+    assert '"m copy"' in notice.message
+    named = [read(table.assign(group=name), name) for name in ("m", "n")]
+    for parts in (named, [read(table, "m"), read(shifted(table), "n")]):
+        notices = check_against(ta.Measurements.of(parts), arm.robot)
+        assert "copied_rows" not in {each.kind for each in notices}

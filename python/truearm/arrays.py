@@ -1,12 +1,15 @@
 """Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
 
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.errors import InputError, list_rows
+from truearm.errors import InputError, list_names, list_rows
 from truearm.named_values import check_readings
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RIGID_WITHIN: Final = 1e-8
 """How far R^T R of a rotation may be from the identity, as in the core; a last row may be as far off."""
@@ -85,6 +88,17 @@ def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.f
     check_readings(values, what=what)
     check_finite(rows, what=what)
     return rows, single
+
+
+def check_columns(table: "pd.DataFrame", *, where: str) -> None:
+    """Raise InputError naming the columns of a table whose type is none of numbers."""
+    wrong = {str(name): kind for name, kind in table.dtypes.items() if kind.kind not in "biuf"}
+    if wrong:
+        raise InputError(
+            f"column {list_names(list(wrong))} of type {list_names([str(kind) for kind in wrong.values()])}",
+            where=where,
+            rule="Columns hold numbers",
+        )
 
 
 def check_finite(rows: NDArray[np.float64], *, what: str) -> None:

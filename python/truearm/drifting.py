@@ -29,7 +29,7 @@ from truearm.units import MM_PER_METRE
 
 FEWEST_ROWS: Final = 30
 """Training rows of a set-up, at the least, that are asked for a drift: fewer have shown none."""
-OVERWHELMING: Final = 10.0
+LEAST_EVIDENCE: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.1
 """A drift, or a change of one, of a smaller root mean square, in deviations of what is left, is let be."""
@@ -124,13 +124,13 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     for look in range(MOST_LOOKS):
         rough = fit_rows(task, drift.taken_out(data).select(some), known).after(rough)
         known = KnownHyper(near=rough.variable, rough=True)
-        found = _drift_of(task, rough, drift, (data, some), most_steps=look + 1)
+        found = _drift_of(task, rough, drift, data, some, most_steps=look + 1)
         if found is None:
             break
         drift = found
     fits = fit_rows(task, drift.taken_out(data).select(train), replace(known, rough=False)).after(rough)
     # Waves and gross rows, which only the finished fit is without, may have hidden one from the rough ones.
-    found = None if drift else _drift_of(task, fits, drift, (data, train), most_steps=MOST_LOOKS)
+    found = None if drift else _drift_of(task, fits, drift, data, train, most_steps=MOST_LOOKS)
     if found is not None:
         drift = found
         fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable)).after(fits)
@@ -138,15 +138,13 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
 
 
 def _drift_of(
-    task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows], *, most_steps: int
+    task: Task, fits: Fits, before: Drift, data: Measurements, train: Rows, *, most_steps: int
 ) -> Drift | None:
-    """The drift that the variable fit shows; None where it is that which it was made without, or next to it.
-
-    `rows` are all rows and those of them that were fitted.
+    """The drift that the fit to the rows `train` shows; None where it is that which it was made without, or
+    next to it.
     """
     if fits.variable is None:
         return None
-    data, train = rows
     left, weight = _residuals_in_world(task, fits.variable, data.select(train))
     left += before.moved[train]
     moved, jumps = before.moved.copy(), dict(before.jumps)
@@ -162,7 +160,7 @@ def _drift_of(
             trust = means(weight[own], visits, weight[own])
             wanted = np.concatenate([before.progress[every], times])
             found, noise, steps, gain = find_drift(known, seen, trust, wanted, most_steps)
-            if gain <= OVERWHELMING:
+            if gain <= LEAST_EVIDENCE:
                 found, steps = np.zeros_like(found), []
             change = found[len(every) :] - before.moved[train[own]]
             if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:

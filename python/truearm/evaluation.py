@@ -192,7 +192,8 @@ def evaluate(
     data = without_parts(lost, data, selection)
     frame, judged = divide(task, data, chosen)
     found_by = data.select(frame if len(frame) else judged)
-    chosen_rows, not_judged = _found_again(found_by, given.select(judged), selection, (chosen, lost[judged]))
+    given_rows, own_lost = given.select(judged), lost[judged]
+    chosen_rows, not_judged = _found_again(found_by, given_rows, selection, chosen, own_lost)
     notices += not_judged
     with stages("finding frame and tool"):
         models = {
@@ -209,7 +210,7 @@ def evaluate(
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
         gross = _gross(task, calibration, models[best], found_by, rows, chosen)
-    notices += [*_warnings(calibration, given, (chosen, stages), held, gross), *gross.doubts]
+    notices += [*_warnings(calibration, given, chosen, stages, held=held, gross=gross), *gross.doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
     counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
@@ -219,24 +220,26 @@ def evaluate(
 def _warnings(
     calibration: Calibration,
     data: Measurements,
-    how: tuple[EvaluationOptions, Stages],
+    options: EvaluationOptions,
+    stages: Stages,
+    *,
     held: HeldRows,
     gross: _Gross,
 ) -> list[Notice]:
     """What makes the calibration of no use, and what is not as it was when it was made."""
     if gross.spoiled:
         return gross.spoiled
-    options, _ = how
     told = _of_no_use(calibration, held, gross.changed) or gross.changed
     if told and (options.keep_frames or options.keep_tool):
         told = _moved(calibration, data, options, held.median_mm(calibration.model_name)) or told
-    return _with_slips(calibration, data, how, told) if gross.changed else told
+    return _with_slips(calibration, data, options, stages, told) if gross.changed else told
 
 
 def _with_slips(
     calibration: Calibration,
     data: Measurements,
-    how: tuple[EvaluationOptions, Stages],
+    options: EvaluationOptions,
+    stages: Stages,
     told: list[Notice],
 ) -> list[Notice]:
     """What slipped while rows were measured: where that is most of what they miss, in place of what was told
@@ -246,7 +249,6 @@ def _with_slips(
 
     if not can_be_updated(calibration):
         return told
-    options, stages = how
     with stages("looking for what slipped"):
         slipped = slipped_meanwhile(calibration, data, options.use)
     most = any(slip.share > MOSTLY for slip in slipped)
@@ -293,13 +295,12 @@ def _lost_parts(task: Task, calibration: Calibration, data: Measurements, option
 
 
 def _found_again(
-    found_by: Measurements, judged: Measurements, selection: Selection, given: tuple[EvaluationOptions, Mask]
+    found_by: Measurements, judged: Measurements, selection: Selection, options: EvaluationOptions, lost: Mask
 ) -> tuple[Measurements, list[Notice]]:
     """The judged rows with what is known on the tool, and a notice of what is not.
 
-    `given` are the options, and what of the rows is not known in the set-up that is kept.
+    `lost` is what of the rows is not known in the set-up that is kept.
     """
-    options, lost = given
     if (options.keep_frames or options.keep_tool) and not selection.judges_another:
         notices = [*never_found(lost, judged, selection), *holding_nothing(judged, selection)]
         return without_parts(lost, judged, selection), notices

@@ -23,20 +23,27 @@ from truearm.joined_tables import join_tables
 from truearm.measurements import Measurements
 from truearm.named_values import JOINT
 from truearm.tables.columns import (
-    DISTANCE,
+    DISTANCE_COLUMN,
     QUATERNION,
-    SIGMA,
-    TARGET,
+    SIGMA_COLUMN,
+    TARGET_COLUMN,
     WORDS,
     MissingColumnError,
     StatedUnits,
 )
 from truearm.tables.measured_fields import read_fields
 from truearm.tables.raw_tables import Marks, RawTable, read_raw
-from truearm.tables.reading import table_from_frame
+from truearm.tables.reading import as_number, table_from_frame
 from truearm.tables.rotation_columns import RotationColumns
 from truearm.types import Floats
-from truearm.units import ANGLE_UNITS, COLUMN_ANGLE_UNITS, COLUMN_LENGTH_UNITS, STATED_LENGTH_UNITS, to_si
+from truearm.units import (
+    ANGLE_UNITS,
+    COLUMN_ANGLE_UNITS,
+    COLUMN_LENGTH_UNITS,
+    STATED_LENGTH_UNITS,
+    to_si,
+    unit_in_header,
+)
 
 UNITS: Final = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
 WHICH: Final = "target"
@@ -141,7 +148,8 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     _check(frame, table)
     left_out, unused = [*table.left_out, *empty], _unused(table, named, plan)
-    return Imported(frame.reset_index(drop=True), unused, left_out, table.remarks, _unsaid(table))
+    notices = [*_unsaid(table), *_kept_as_text(table, plan)]
+    return Imported(frame.reset_index(drop=True), unused, left_out, table.remarks, notices)
 
 
 def _unsaid(table: RawTable) -> list[Notice]:
@@ -171,7 +179,7 @@ def _by_target(
     """Columns of points with those of further targets: x2, y2, z2 for rows whose target is 2, and so on."""
     which = np.asarray(columns[WHICH], dtype=np.float64)
     others = {name: values for name, values in columns.items() if name != WHICH}
-    several = [name for name in others if TARGET.fullmatch(name) and name not in POINT]
+    several = [name for name in others if TARGET_COLUMN.fullmatch(name) and name not in POINT]
     if several or not set(POINT) <= set(others):
         raise UsageError(
             f"there {'are columns of several points' if several else 'is no point'}",
@@ -200,7 +208,11 @@ def _by_target(
 
 def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:
     """The rows in which something was measured if there are any, and in words those in which nothing was."""
-    places = [name for name in frame.columns if TARGET.fullmatch(str(name)) or DISTANCE.fullmatch(str(name))]
+    places = [
+        name
+        for name in frame.columns
+        if TARGET_COLUMN.fullmatch(str(name)) or DISTANCE_COLUMN.fullmatch(str(name))
+    ]
     measured = frame[places].notna().any(axis=1)
     if measured.all() or not measured.any():
         return frame, []
@@ -266,7 +278,7 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
     Raises:
         UsageError: If it is not stated, is one that no such column has, or another one than its name says.
     """
-    _, unit = _split_unit(table, theirs)
+    name, unit = _split_unit(table, theirs)
     known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else COLUMN_LENGTH_UNITS
     if ours in (*WORDS, *QUATERNION, WHICH):
         known = ()
@@ -278,11 +290,37 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
             rule=f'"{ours}" {kind}',
             way_out=f"Write --map {ours}=COLUMN{':' + known[-1] if known else ''}",
         )
-    if unit or not known:
+    if (unit and ours in plan.columns) or not known:
+        return unit
+    _check_file_agrees(table, ours, name, unit, plan)
+    if unit:
         return unit
     stated = _stated_unit(ours, plan)
     _check_header(table, ours, theirs, stated)
     return stated
+
+
+def _check_file_agrees(table: RawTable, ours: str, name: str, unit: str, plan: ImportPlan) -> None:
+    """Raise UsageError if a column's name, with `unit` at its end or none, says another than stands below.
+
+    A last "in" may be the word: it is no unit beside another one that is stated for lengths.
+    """
+    part = table.parts[name]
+    named, below = unit or unit_in_header(part.name), part.unit
+    by = "the row of units below it"
+    if unit == "in" and not below and not JOINT.fullmatch(ours) and plan.length_unit is not None:
+        below, by = plan.length_unit, "--length-unit"
+    if "" in (named, below) or named == below:
+        return
+    ways = [typed(f"{ours}={name}:{each}") for each in (named, below) if each in UNITS]
+    raise UsageError(
+        f'column "{name}" says {named}, {by} says {below}',
+        where=table.where,
+        rule=AGREE,
+        way_out=f"State the right one behind the column: {' or '.join(f'--map {way}' for way in ways)}"
+        if ways
+        else "Convert this column in the file",
+    )
 
 
 def _check_header(table: RawTable, ours: str, theirs: str, stated: str) -> None:
@@ -346,10 +384,37 @@ def _kept(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> Floats |
         return to_si(table.numbers(name), unit)
     if plan.on is not None and name == plan.on.partition("=")[0]:
         return table.texts(name)
+    return table.texts(name) if _why_text(table, name) else table.numbers(name)
+
+
+def _why_text(table: RawTable, name: str) -> str:
+    """Why a column that is kept without a unit stays text, in words; "" where it holds numbers alone."""
     try:
-        return table.numbers(name)
-    except TruearmError:
-        return table.texts(name)
+        table.numbers(name)
+    except TruearmError as error:
+        return str(error)
+    return ""
+
+
+def _kept_as_text(table: RawTable, plan: ImportPlan) -> list[Notice]:
+    """Of the columns that are kept those that are text by some of their cells: others hold numbers."""
+    key = "" if plan.on is None else plan.on.partition("=")[0]
+    found = {}
+    for ours, theirs in plan.keep.items():
+        name, unit = _split_unit(table, theirs)
+        if not unit and name != key and any(map(_is_number, table.texts(name).tolist())):
+            found[ours] = _why_text(table, name)
+    return [
+        Notice("kept_as_text", f'"{ours}" is kept as text, which nothing varies with: {why}')
+        for ours, why in found.items()
+        if why
+    ]
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell holds a finite number, with a point or a comma."""
+    number = as_number(cell.replace(",", "."))
+    return number is not None and bool(np.isfinite(number))
 
 
 def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
@@ -381,14 +446,14 @@ def _check_is_ours(ours: str) -> None:
 
 def _is_ours(name: str) -> bool:
     """Whether a name, without unit, is one of a measurement column."""
-    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET, SIGMA, DISTANCE))
+    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET_COLUMN, SIGMA_COLUMN, DISTANCE_COLUMN))
     has_unit = any(name.endswith(f"_{unit}") for unit in UNITS)
     return name in QUATERNION + WORDS or (any(matches) and not has_unit)
 
 
 def _order(ours: str) -> tuple[int, int, str]:
     """Joints, targets, quaternion, then the rest."""
-    joint, target = JOINT.fullmatch(ours), TARGET.fullmatch(ours)
+    joint, target = JOINT.fullmatch(ours), TARGET_COLUMN.fullmatch(ours)
     if joint:
         return 0, int(joint[1]), ""
     if target:

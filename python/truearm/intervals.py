@@ -5,12 +5,12 @@ from typing import Final
 import numpy as np
 
 from truearm._core import NORMAL_95, residuals
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.fits.core_set import core_set
 from truearm.fits.fitting import Fits, Task
 from truearm.fits.models import VARIABLE
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
+from truearm.rows.evenly import some_rows
 
 MOST_ROWS: Final = 500
 """More rows change the share by less than its own uncertainty, and cost time."""

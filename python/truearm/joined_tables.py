@@ -148,9 +148,15 @@ def _side_by_side(
             raise UsageError(f'"{here}" is a column of both tables', where=first.where, way_out="Rename one")
         parts[here] = part._replace(rows=part.rows[rows[1]])
     where = f"{first.where} with {second.where}, rows as joined"
-    unsaid = tuple(word for word in first.unsaid if word in second.unsaid)
+    unsaid = tuple(dict.fromkeys([*_unsaid(first, second), *_unsaid(second, first)]))
     left_out = [*first.left_out, *second.left_out, *alone]
     return RawTable(where, parts, len(rows[0]), left_out, [*first.remarks, *second.remarks], unsaid)
+
+
+def _unsaid(table: RawTable, other: RawTable) -> list[str]:
+    """What no cell of a table says of what was stated, nor of the other where it was stated for that, too."""
+    stated = {word for part in other.parts.values() for word in part.marks.missing}
+    return [word for word in table.unsaid if word in other.unsaid or word not in stated]
 
 
 def _alone(table: RawTable, name: str, rows: Sequence[int]) -> list[str]:

@@ -1,6 +1,7 @@
 """Measurements: joint readings and what was measured at them."""
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -11,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers, as_row_numbers, read_only
+from truearm.arrays import as_numbers, as_row_numbers, check_columns, read_only
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import count as whole_number
@@ -111,7 +112,8 @@ class Measurements:
                 array = _as_array(name, value)
                 object.__setattr__(self, name, read_only(array))
                 self._check_length(name, array)
-        self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
+        check_columns(required(self.features, pd.DataFrame, "the table of features"), where="features")
+        self._check_length("features", self.features)
         object.__setattr__(self, "features", self.features.reset_index(drop=True))
 
     def __len__(self) -> int:
@@ -242,8 +244,9 @@ class Measurements:
             UsageError: As for read_csv, and if a file is named twice.
         """
         files = [as_path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
-        for path in files:
-            if files.count(path) > 1:
+        places = [os.path.realpath(path) for path in files]
+        for path, place in zip(files, places, strict=True):
+            if places.count(place) > 1:
                 raise UsageError("the file is named twice", where=str(path))
         stems = [path.stem for path in files]
         names = [
@@ -299,9 +302,10 @@ class Measurements:
         another. Groups that a column names keep their names: equal names mean the same set-up. Those that
         are called after their file are set-ups of their own, as with `read_files`, and so is the fixed point
         that their distances lead to where nothing names it: files of one name are called by their folders
-        as well, and tables of one name are numbered, "data" and "data 2". Rows that were selected from the
-        same table belong to the same set-up. Tables that were read separately, as one that has grown and its
-        earlier state or the rows of a loaded calibration, are one set-up only if they share rows.
+        as well. Tables of one name are numbered, "data" and "data 2", among the sources whoever names their
+        set-ups. Rows that were selected from the same table belong to the same set-up. Tables that were read
+        separately, as one that has grown and its earlier state or the rows of a loaded calibration, are one
+        set-up only if they share rows.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.

@@ -49,7 +49,8 @@ class Robot(RobotData):
         base: Fixed transform (4, 4) before the first link.
         flange: Fixed transform (4, 4) after the last link.
         tool: Fixed transform (4, 4) from flange to tool.
-        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
+        base_row: Denavit-Hartenberg row (5,) that `base` was given as; None where it was not, and in an arm
+            with another base.
         coupling: Joint values from readings (N, N), directions included.
         limits: Lowest and highest reading (N, 2); infinite where there is none.
         payload: What the arm carried, `mass_kg` and `centre_of_gravity_mm`, if stated.

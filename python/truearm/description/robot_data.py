@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import frozen, rigid
+from truearm.description.dh_row import row_transform
 from truearm.description.urdf_names import UrdfNames
 from truearm.errors import InputError
 from truearm.types import Floats
@@ -17,6 +18,8 @@ Joint = Literal["revolute", "prismatic"]
 
 MIN_COUPLING_DETERMINANT: Final = 1e-9
 TRANSFORMS: Final = ("base", "flange", "tool")
+SAME: Final = 1e-9
+"""Elements of transforms that differ by less are equal: lengths in m and cosines."""
 OPEN_REACH_M: Final = 0.5
 """How far from zero a joint that slides is taken to go where it has no limit."""
 
@@ -66,7 +69,7 @@ class RobotData:
             value = _checked(field, getattr(self, field), shape)
             object.__setattr__(self, field, _rigid(field, value) if field in TRANSFORMS else value)
         if self.base_row is not None:
-            object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
+            object.__setattr__(self, "base_row", self._row_of_base(self.base_row))
         unordered = np.flatnonzero(~(self.limits[:, 0] < self.limits[:, 1]))
         if len(unordered):
             raise InputError(
@@ -80,6 +83,12 @@ class RobotData:
                 where="coupling",
                 rule="Every joint value must come from one set of readings only",
             )
+
+    def _row_of_base(self, row: Floats) -> Floats | None:
+        """The row (5,) that the base was given as; None where the base is another one by now."""
+        row = _checked("base_row", row, (5,))
+        made = row_transform(row, self.convention)
+        return row if np.allclose(made, self.base, rtol=0.0, atol=SAME) else None
 
     @property
     def joint_count(self) -> int:

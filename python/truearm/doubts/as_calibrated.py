@@ -7,7 +7,6 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.doubts.gross_rows import Expected, widened
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.doubts.of_results import helps
 from truearm.doubts.outliers import Outliers, known_mean_mm, own_means_mm
 from truearm.doubts.what_to_check import OF_FILE
@@ -15,6 +14,7 @@ from truearm.errors import Notice
 from truearm.fits.models import NOMINAL
 from truearm.judgement.held_rows import HeldRows
 from truearm.lengths import length_mm
+from truearm.rows.evenly import some_rows
 from truearm.types import AXES, Floats
 from truearm.units import MM_PER_METRE
 

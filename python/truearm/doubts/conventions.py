@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from truearm._core import Chain
-from truearm.description.robot_data import Convention as Rows
+from truearm.description.robot_data import Convention as RowConvention
 from truearm.doubts.column_units import ColumnUnit, column_units
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen
 from truearm.doubts.of_results import FITS_OTHERWISE
 from truearm.errors import Notice, count_of
 from truearm.fits.fitting import Task
@@ -18,6 +18,7 @@ from truearm.fits.parameters import ALPHA, KINDS, THETA, A, D
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
@@ -38,7 +39,7 @@ QUARTERS: Final = (1, -1, 2)
 QUARTER_DEG: Final = 90.0
 SIGNED: Final = 1e-3
 """Parameters that are larger have a sign to be wrong, m or sine of an angle."""
-OTHER_ROWS: Final[Mapping[Rows, Rows]] = {"standard": "modified", "modified": "standard"}
+OTHER_ROWS: Final[Mapping[RowConvention, RowConvention]] = {"standard": "modified", "modified": "standard"}
 SHOULDER, ELBOW = 1, 2
 MIRROR: Final = np.array([1.0, -1.0, 1.0])
 
@@ -107,7 +108,7 @@ class Convention:
             table[link, place] *= -1.0
         return table
 
-    def _rows(self, robot: Robot) -> Rows:
+    def _rows(self, robot: Robot) -> RowConvention:
         return OTHER_ROWS[robot.convention] if self.other_rows else robot.convention
 
     def measured(self, seen: Seen) -> Seen:

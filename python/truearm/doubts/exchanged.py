@@ -73,7 +73,7 @@ def _notices(found: "Calibration", rows: FittedRows, model: ArmModel) -> tuple[N
         return ()
     # In the order of the file.
     far = far[np.argsort(rows.data.rows[far], kind="stable")]
-    fit = _fitting_elsewhere(found, rows, (model, far), near_m)
+    fit = _fitting_elsewhere(found, rows, model, far, near_m)
     elsewhere = [k // count for k, other in fit if k // count != other // count]
     beside = [k // count for k, other in fit if k // count == other // count]
     notices = []
@@ -102,15 +102,15 @@ def _what_became(fate: str) -> str:
 
 
 def _fitting_elsewhere(
-    found: "Calibration", rows: FittedRows, of: tuple[ArmModel, Places], near_m: float
+    found: "Calibration", rows: FittedRows, model: ArmModel, outlying: Places, near_m: float
 ) -> list[tuple[int, int]]:
-    """Places of points that fit elsewhere among those of the outliers, target by target in a row, with the
-    place where they fit; `of` are the model and which rows are outliers.
+    """Places of points that fit elsewhere among those of the outlying rows, target by target in a row, with
+    the place where they fit.
 
     The model has a point where it was measured less its residual; another one fits there if it was measured
     near by.
     """
-    targets, (model, outlying) = list(found.selection.targets), of
+    targets = list(found.selection.targets)
     group = np.array([found.groups.index(name) for name in rows.data.group[outlying]])
     base_from_world = model.setup.frames[group, :3, :3].transpose(0, 2, 1)
     points = rows.data.targets[outlying][:, targets]

@@ -15,7 +15,7 @@ from truearm._core import ConstantFit, fit_constant
 from truearm.doubts.unbent import UNBENT, unbent
 from truearm.errors import Notice, list_outliers
 from truearm.fits.core_set import core_set, distance_ends
-from truearm.fits.fitted_rows import OVERWHELMING, FittedRows, at_rows
+from truearm.fits.fitted_rows import ODDS_OF_CHANCE, FittedRows, at_rows
 from truearm.fits.fitting import (
     LOWER,
     MOST_FAR,
@@ -124,7 +124,7 @@ class _Judged:
             others = far.copy()
             others[place] = False
             more = self._left(self.least_squares(others), variance, others) - left
-            limit = fdtri(values[place], free, 1.0 - OVERWHELMING)
+            limit = fdtri(values[place], free, 1.0 - ODDS_OF_CHANCE)
             yield place, more / values[place] / (left / free) / limit
 
     def _of_each(self, fit: ConstantFit) -> Floats:

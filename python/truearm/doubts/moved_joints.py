@@ -18,7 +18,7 @@ from truearm.doubts.row_order import FEWEST_VISITS, FOLLOWED, ORDER_OF_POSES, po
 from truearm.doubts.slips import Slip
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice, count_of
-from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
+from truearm.fits.fitted_rows import ODDS_OF_CHANCE, FittedRows
 from truearm.inputs import is_payload
 from truearm.lengths import length_mm
 from truearm.tables.columns import OF_MEASURING
@@ -105,7 +105,7 @@ def moved_joints(
     if found.variable is None or len(seen.rows) < FEWEST_VISITS:
         return []
     asked = [_moved(found, seen, column) for column in _asked(found, rows, seen, progress)]
-    told = [moved for moved in asked if moved.chance * len(asked) < OVERWHELMING]
+    told = [moved for moved in asked if moved.chance * len(asked) < ODDS_OF_CHANCE]
     told.sort(key=lambda moved: moved.chance)
     if slips and (not told or min(slip.chance for slip in slips) <= told[0].chance * len(asked)):
         return [_of_slip(slip, asked, seen) for slip in slips]

@@ -11,18 +11,13 @@ from truearm.fits.fitting import fit_options
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
 from truearm.types import Floats, Rows
 
-MOST_ROWS: Final = 60
 FEWEST_ROWS: Final = 12
-"""Rows, at the most and at the least, that such a fit is asked of."""
+"""Rows, at the least, that such a fit is asked of."""
 LEAST_SPREAD_M: Final = 1e-4
 """Points that lie closer together are taken to be so far apart."""
-
-
-def some_rows(rows: Rows, most: int = MOST_ROWS) -> Rows:
-    """At most so many of row indices, spread evenly."""
-    return rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(np.int64))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +41,7 @@ class Seen:
 
     @classmethod
     def first(cls, data: Measurements) -> "Seen | None":
-        """Up to MOST_ROWS points of the first set-up, of the target that most rows hold; None if too few."""
+        """Some points of the first set-up, of the target that most rows hold; None if too few."""
         if data.target_count == 0:
             return None
         target = data.most_held()

@@ -6,15 +6,18 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts.mixed_units import check_mixed_units
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit
 from truearm.doubts.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.doubts.turning_sense import FIT, MISFIT
 from truearm.doubts.unit_change import check_one_unit
-from truearm.errors import InputError, Notice
+from truearm.errors import InputError, Notice, list_names
 from truearm.measurements import Measurements
 from truearm.registration import spread_m
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
+from truearm.rows.used_distances import holds_distances
 from truearm.rows.visits import pose_numbers
+from truearm.tables.same_tables import copied_rows
 from truearm.types import Mask
 from truearm.units import FULL_TURN, MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
@@ -63,17 +66,25 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
     """Check that measurements can be of `robot`.
 
     Returns:
-        What the user should know: joints outside their limits, rows identical in everything.
+        What the user should know: joints outside their limits, rows that are there twice, equal readings at
+        points that lie apart.
 
     Raises:
         InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians
-            or the other way round, millimetres as metres or the other way round, inches as either, or all
-            poses are alike.
+            or the other way round, millimetres as metres or the other way round, inches as either, all poses
+            are alike, or only one row of a pair is there.
     """
     outside = check_readings(measurements, robot)
+    _check_whole_pairs(measurements)
     _check_alike(measurements)
     check_points(measurements, robot)
-    return [*measurements.notices, *outside, *_repetitions(measurements), *_apart_at_equal(measurements)]
+    return [
+        *measurements.notices,
+        *outside,
+        *_repetitions(measurements),
+        *_copies(measurements),
+        *_apart_at_equal(measurements),
+    ]
 
 
 def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
@@ -110,6 +121,21 @@ def check_points(measurements: Measurements, robot: Robot) -> None:
     check_angles(measurements, robot)
     _check_far(measurements, NO_REACH_M)
     _check_distances(measurements, robot)
+
+
+def _check_whole_pairs(measurements: Measurements) -> None:
+    """Raise InputError where distances are used and the other row of a pair was left behind."""
+    if measurements.pair is None or not holds_distances(measurements):
+        return
+    _, index, count = np.unique(measurements.pair, return_inverse=True, return_counts=True)
+    alone = (measurements.pair != "") & (count[index.reshape(-1)] < 2)
+    if alone.any():
+        raise InputError(
+            f"the other row of the pair is not there in {measurements.row_names(alone)}",
+            where=", ".join(measurements.files),
+            rule="The distance of a pair takes both of its rows",
+            way_out="Select both rows of a pair, or neither",
+        )
 
 
 def _check_far(measurements: Measurements, most: float) -> None:
@@ -395,3 +421,16 @@ def _repetitions(measurements: Measurements) -> list[Notice]:
         return []
     message = f"Identical to an earlier row in everything, counted once: {measurements.row_names(repeated)}."
     return [Notice("identical_rows", message, tuple(measurements.rows[repeated].tolist()))]
+
+
+def _copies(measurements: Measurements) -> list[Notice]:
+    copied = copied_rows(measurements)
+    if not copied.any():
+        return []
+    names = list_names(measurements.select(copied).groups)
+    message = (
+        f"Set-up {names} holds rows that another one holds as well, with all their digits, and that count "
+        f"twice: {measurements.row_names(copied)}. What was measured once tells no more under two names, and "
+        "standard errors are too small by it: leave one of the files out, or the rows that both hold."
+    )
+    return [Notice("copied_rows", message, tuple(measurements.rows[copied].tolist()))]

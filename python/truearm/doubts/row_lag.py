@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.doubts.conventions import BETTER, NEAR_M
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen
 from truearm.doubts.of_results import ROWS_SHIFTED
 from truearm.errors import Notice, count_of
 from truearm.fits.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
 from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
 

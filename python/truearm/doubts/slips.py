@@ -25,7 +25,7 @@ from truearm.doubts.row_order import FOLLOWED, poses_change, poses_of, share_exp
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
 from truearm.fits.enough_values import FRAME_UNKNOWNS
-from truearm.fits.fitted_rows import OVERWHELMING, FittedRows
+from truearm.fits.fitted_rows import ODDS_OF_CHANCE, FittedRows
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -192,7 +192,7 @@ def slips_of(sessions: Sequence[Session]) -> list[Slip]:
     told = list[Slip]()
     for step, session in sorted(found, key=lambda pair: -pair[0].gain):
         chance, kind = step.chance * len(sessions), KINDS[step.shape.what]
-        if chance < OVERWHELMING and not (told and kind == JOINT_MOVED):
+        if chance < ODDS_OF_CHANCE and not (told and kind == JOINT_MOVED):
             behind = int(session.rows[step.place]) if step.place else None
             told.append(Slip(Notice(kind, _words(session, step)), chance, step.share, behind))
     return told

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.doubts.nominal_misfit import FEWEST_ROWS, NominalArm, Seen
 from truearm.doubts.of_results import FITS_OTHERWISE
 from truearm.errors import Notice
 from truearm.fits.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
+from truearm.rows.evenly import some_rows
 from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE
 

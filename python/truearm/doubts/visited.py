@@ -7,10 +7,10 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import VariableSpread
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.doubts.row_order import FEWEST_VISITS
 from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.measured_parts import held_parts
+from truearm.rows.evenly import some_rows
 from truearm.rows.shots import Scatter
 from truearm.rows.visits import means, pose_numbers, visits_of
 from truearm.types import AXES, Floats, Mask, Rows

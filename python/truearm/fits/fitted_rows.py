@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 UNUSED: Final = 0
 TRAINED: Final = 1
 HELD_OUT: Final = 2
-OVERWHELMING: Final = 1e-6
+ODDS_OF_CHANCE: Final = 1e-6
 """A row is an outlier where the model makes errors as large as its own less likely than this."""
 
 
@@ -167,10 +167,10 @@ def _marks(data: Measurements) -> list[bytes]:
 
 
 def overwhelming(freedom: NDArray[np.int64]) -> Floats:
-    """Sums (n,) that so many squares (n,), in units of their variances, surpass with OVERWHELMING odds."""
+    """Sums (n,) that so many squares (n,), in units of their variances, surpass with ODDS_OF_CHANCE odds."""
     from scipy.special import gammainccinv  # noqa: PLC0415 - slow to import
 
-    return np.asarray(2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))
+    return np.asarray(2.0 * gammainccinv(freedom / 2.0, ODDS_OF_CHANCE))
 
 
 def sides(count: int, split: Split) -> NDArray[np.int64]:

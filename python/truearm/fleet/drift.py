@@ -7,7 +7,6 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.calibration import Calibration
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.doubts.outliers import known_mean_mm
 from truearm.errors import InputError, WorkError
 from truearm.fits.identified import Frame
@@ -16,6 +15,7 @@ from truearm.fits.parameters import are_lengths
 from truearm.fleet.gauge import as_placed_in
 from truearm.measurements import Measurements
 from truearm.robot import Robot
+from truearm.rows.evenly import some_rows
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from truearm.arrays import as_numbers, check_finite, rotation_fault
 from truearm.calibration import Calibration
 from truearm.doubts.plausibility import check_points, check_readings
-from truearm.errors import InputError, Notice, UsageError
+from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.fits.endpoints import at_tool
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.frames_toml import former_entry, tip_covariance, write_frame
@@ -25,6 +25,8 @@ from truearm.types import Floats
 
 BEHIND_FLANGE: Final = (0.0, 0.0, -0.1, 1.0)
 """A point of the wrist in the flange's frame, m."""
+ROUNDING: Final = 1e-6
+"""What a covariance may differ by from a symmetric one, in parts of its largest entry."""
 
 __all__ = ["IdentifiedFrame", "find_object", "find_tool", "former_entry", "tip_covariance", "write_frame"]
 
@@ -47,7 +49,8 @@ def find_tool(
         points: Name of the point of each touch; one point by default.
 
     Raises:
-        UsageError: If an orientation is needed and missing, or given and measured.
+        UsageError: If an orientation is needed and missing, or given and measured, or there are more or fewer
+            names of points than touches.
         InputError: If the data is of another arm.
         WorkError: If the data determines too little.
     """
@@ -63,8 +66,13 @@ def find_tool(
         raise UsageError(
             "touches of a point do not tell how the tool is turned", way_out="Give its orientation"
         )
+    names = ["point"] * len(data) if points is None else list(points)
+    if len(names) != len(data):
+        raise UsageError(
+            f"{count_of(len(names), 'name')} of points", where="points", rule=f"There are {len(data)} touches"
+        )
     poses = calibrated_poses(calibration, data, np.eye(4))
-    return _with(notices, tool_from_touches(poses, points or ["point"] * len(data), turned, data.rows))
+    return _with(notices, tool_from_touches(poses, names, turned, data.rows))
 
 
 def find_object(
@@ -82,7 +90,7 @@ def find_object(
         covariance: Covariance of its tip along the flange's axes (3, 3), m^2.
 
     Raises:
-        InputError: If the data is of another arm, or has no positions.
+        InputError: If the data is of another arm, or has no positions, or the covariance is none.
         WorkError: If the points do not tell where the object is.
     """
     calibration, data = required(calibration, Calibration, "the calibration"), Measurements.of(data)
@@ -108,6 +116,13 @@ def _covariance(given: ArrayLike) -> Floats:
     covariance = as_numbers(given, what="the entries of the covariance")
     if covariance.shape != (3, 3):
         raise InputError(f"the covariance has shape {covariance.shape}", rule="That of a point's is (3, 3)")
+    check_finite(covariance, what="the entries of the covariance")
+    rounding = ROUNDING * float(np.abs(covariance).max())
+    if np.abs(covariance - covariance.T).max() > rounding or np.linalg.eigvalsh(covariance)[0] < -rounding:
+        raise InputError(
+            "the covariance is none",
+            rule="It is symmetric, and in no direction the square of a standard deviation is negative",
+        )
     return covariance
 
 

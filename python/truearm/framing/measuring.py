@@ -6,8 +6,9 @@ from truearm.calibration import Calibration
 from truearm.doubts.turning_sense import check_turns
 from truearm.errors import WorkError
 from truearm.fits.core_set import Selection, select
-from truearm.fits.enough_values import frame_unknowns
+from truearm.fits.enough_values import frame_unknowns, measured_values
 from truearm.fits.fitting import Task, fit_setup
+from truearm.fits.measured_parts import held_parts
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.identified_frame import IdentifiedFrame
@@ -35,9 +36,8 @@ def tool_from_measurements(
     selection = _selection(calibration, data, stated=orientation is not None)
     task = Task(calibration.arm, selection, data.groups, calibration.options)
     first, width = frame_unknowns(task), 6 if selection.orientation else 3
-    freedom = len(data) * width - first - width
     noun = "poses" if selection.orientation else "points"
-    _check_told(calibration, data, freedom, f"measured {noun}")
+    _check_told(calibration, data, measured_values(task, data) - first - width, f"measured {noun}")
     model = calibration.model
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
     fit = fit_setup(task, data, parameters)
@@ -52,6 +52,7 @@ def tool_from_measurements(
     own = fit.covariance[first : first + width, first : first + width]
     covariance[:width, :width] = turned[:width, :width] @ own @ turned[:width, :width].T
     noise, rows = fit.noise[0], data.rows
+    freedom = 3 * int(held_parts(data, selection).sum()) - first - width
     what = f"{len(data)} measured {noun} of it"
     notices = far_rows(residuals[:, :3], _by_frame_and_tip(calibration, data, transform), rows)
     check_agreement(noise, notices)
@@ -76,12 +77,12 @@ def _selection(calibration: Calibration, data: Measurements, *, stated: bool) ->
     return selection
 
 
-def _check_told(calibration: Calibration, data: Measurements, freedom: int, noun: str) -> None:
-    """Raise WorkError where rows do not tell the tool, by how many values there are and how they turn it.
+def _check_told(calibration: Calibration, data: Measurements, spare: int, noun: str) -> None:
+    """Raise WorkError where rows do not tell the tool, by their values to spare and by how they turn it.
 
     The fit itself does not fail there: it holds targets near the flange.
     """
-    if freedom <= 0:
+    if spare <= 0:
         raise WorkError(
             f"{len(data)} {noun} of the tool tell no more than is unknown",
             rule="There must be more measured values than unknowns",

@@ -175,6 +175,9 @@ class InCone:
     half_angle_rad: float
     target_half_angle_rad: float = np.pi
 
+    def __post_init__(self) -> None:
+        _check_direction(self.axis, "axis")
+
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
         sight = places.point - np.asarray(self.apex)
@@ -197,12 +200,16 @@ class LeastContactAngle:
     pin: ArrayLike = (1.0, 0.0, 0.0)
     least_deg: float = LEAST_CONTACT_DEG
 
+    def __post_init__(self) -> None:
+        _check_direction(self.normal, "normal")
+        _check_direction(self.pin, "pin")
+
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
         pin = places.base_from_tool[:, :3, :3] @ np.asarray(self.pin, dtype=np.float64)
         from_normal = _angle(pin, np.broadcast_to(np.asarray(self.normal, dtype=np.float64), pin.shape))
         from_plane = np.pi / 2.0 - np.minimum(from_normal, np.pi - from_normal)
-        return np.asarray(np.pi / 2.0 - from_plane <= np.pi / 2.0 - np.deg2rad(self.least_deg))
+        return np.asarray(from_plane >= np.deg2rad(self.least_deg))
 
 
 @dataclass(frozen=True)
@@ -293,6 +300,15 @@ def _check_box(low: ArrayLike, high: ArrayLike) -> None:
         raise UsageError(
             f"a box from {least.tolist()} to {most.tolist()}",
             rule="x, y and z in m, the lowest and then the highest",
+        )
+
+
+def _check_direction(given: ArrayLike, name: str) -> None:
+    """Raise UsageError unless this is a vector (3,) that leads somewhere."""
+    vector = as_numbers(given, what=f"the numbers of {name}")
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise UsageError(
+            f"{name} is {vector.tolist()}", rule="A direction has three finite numbers, not all of them zero"
         )
 
 

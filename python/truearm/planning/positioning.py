@@ -1,13 +1,14 @@
 """Nominal inverse kinematics of a point: three joints reach it, the others are held."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from truearm.errors import UsageError, list_rows
 from truearm.planning.configurations import Configuration
 from truearm.robot import Robot
 from truearm.types import Floats, Mask
@@ -43,10 +44,13 @@ class PositionInverse:
         """Readings (n, N) of tool points (n, 3) in the base frame, m, and which were reached, (n,).
 
         Readings of points that were not reached are NaN.
+
+        Raises:
+            UsageError: If the joints that are held keep the arm out of the configuration.
         """
         found = np.full((len(points), self.robot.joint_count), np.nan)
         left = np.arange(len(points))
-        for choice in range(STARTS_TRIED):
+        for choice in range(min(STARTS_TRIED, len(self._starts))):
             if len(left) == 0:
                 break
             near = np.asarray(self._tree.query(points[left], k=[choice + 1])[1])
@@ -89,7 +93,16 @@ class PositionInverse:
         readings = np.tile(np.asarray(self.held, dtype=np.float64), (STARTS, 1))
         drawn = np.random.default_rng(0).uniform(low, high, readings.shape)
         readings[:, self._columns] = drawn[:, self._columns]
-        return readings[self.configuration.holds(self.robot, readings)]
+        found = readings[self.configuration.holds(self.robot, readings)]
+        if len(found) == 0:
+            branch = ", ".join(f"{part} {word}" for part, word in asdict(self.configuration).items() if word)
+            raise UsageError(
+                f"no readings of {list_rows(list(self.joints), 'joint')} have {branch}",
+                where="configuration",
+                rule=f"The other joints are held where held = {np.asarray(self.held).tolist()} has them",
+                way_out="Hold them elsewhere, or ask for another configuration",
+            )
+        return found
 
     @cached_property
     def _tree(self) -> "cKDTree[None]":

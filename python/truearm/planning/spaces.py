@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from truearm.planning.configurations import Configuration
 from truearm.planning.positioning import PositionInverse
 from truearm.robot import Robot
 from truearm.types import Floats, Mask
+
+SAME: Final = 1e-9
+"""Readings that differ by less are equal, rad or m."""
 
 
 class Space(Protocol):
@@ -74,6 +77,19 @@ class JointSpace:
             given = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, limit if given.size == 0 else given)
         _check_box(self)
+        self._check_limits(limits)
+
+    def _check_limits(self, limits: Floats) -> None:
+        """Raise UsageError where the box leaves the limits (D, 2) of the joints."""
+        beyond = (self.low < limits[:, 0] - SAME) | (self.high > limits[:, 1] + SAME)
+        for k in np.flatnonzero(beyond):
+            low, high = limits[k]
+            unit = self.units[k]
+            raise UsageError(
+                f"the space has {self.names[k]} from {self.low[k]:g} to {self.high[k]:g} {unit}",
+                rule=f"The limits of the joint are {low:g} to {high:g} {unit}",
+                way_out="Give low and high within them, or correct the limits of the robot",
+            )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.robot import Robot
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
-from truearm.tables.columns import QUATERNION, TARGET
+from truearm.tables.columns import QUATERNION, TARGET_COLUMN
 from truearm.tables.reading import DELIMITERS
 from truearm.types import Floats, Integers
 from truearm.units import to_si
@@ -241,7 +241,9 @@ class _Reader:
     def _find_parts(self, *, quaternion: bool) -> list[_Part]:
         names = dict(enumerate(self._names))
         joints = {int(m[1]): (c, m[2] or "") for c, n in names.items() if (m := JOINT.fullmatch(n))}
-        points = {m[1]: (c, m[3] or "m") for c, n in names.items() if (m := TARGET.fullmatch(n)) and not m[2]}
+        points = {
+            m[1]: (c, m[3] or "m") for c, n in names.items() if (m := TARGET_COLUMN.fullmatch(n)) and not m[2]
+        }
         turns = {m[1]: (c, m[2] or "rad") for c, n in names.items() if (m := ROTATION.fullmatch(n))}
         wanted = range(1, len(self._joints) + 1)
         self._check_once()
@@ -317,7 +319,7 @@ def _coordinate(name: str) -> str:
     """What a column says of a waypoint, its unit left out; empty for another column."""
     if joint := JOINT.fullmatch(name):
         return f"q{int(joint[1])}"
-    if (point := TARGET.fullmatch(name)) and not point[2]:
+    if (point := TARGET_COLUMN.fullmatch(name)) and not point[2]:
         return str(point[1])
     if turn := ROTATION.fullmatch(name):
         return f"r{turn[1]}"

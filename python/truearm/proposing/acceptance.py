@@ -92,7 +92,6 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     arm = calibration.arm
     directions, names = arm_directions(arm)
     offsets = candidates.jacobian @ directions
-    joints = arm.robot.joint_count
     torque = arm.robot.joint_jacobian(candidates.readings)[:, 2, :]
     largest = np.abs(torque).max(axis=0)
     turning = np.flatnonzero((largest > 1e-6) & arm.robot.revolute)
@@ -102,7 +101,7 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     whole = np.concatenate([offsets * std, setup, PAYLOAD_RAD * bent], axis=2)
     frame = [] if arm.world_is_known else ["frame"] * 6
     tool = ["tool"] * (setup.shape[2] - len(frame))
-    return whole, [*names[:joints], *names[joints:], *frame, *tool, *(f"payload{k + 1}" for k in turning)]
+    return whole, [*names, *frame, *tool, *(f"payload{k + 1}" for k in turning)]
 
 
 def _told_at_last(

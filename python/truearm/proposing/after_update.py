@@ -11,7 +11,7 @@ from truearm.calibration import Calibration
 from truearm.errors import TooFewError
 from truearm.measurements import Measurements
 from truearm.proposing.candidates import Candidates
-from truearm.proposing.next_poses import deviation_mm
+from truearm.proposing.next_poses import deviation_mm, workspace_of
 from truearm.rotations import quaternion_from_matrix
 from truearm.types import Floats
 from truearm.updating import UpdateOptions, update
@@ -39,10 +39,11 @@ def expected_by_update(
         Two numbers; the first alone where the rows are too few for an update.
 
     Raises:
+        UsageError: If the workspace is empty.
         InputError: If it cannot be updated from these for another reason.
         WorkError: If a calibration has no standard deviations.
     """
-    where = replace(candidates, readings=workspace, group=candidates.set_up)
+    where = workspace_of(candidates, workspace)
     now = deviation_mm(where)
     try:
         found = update(before, [*rows, _as_predicted(candidates)], options)

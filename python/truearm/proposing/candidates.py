@@ -11,7 +11,7 @@ from truearm._core import Problem, Setup, linearise, setup_jacobian
 from truearm.arrays import as_rows
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import task_of
-from truearm.errors import UsageError, WorkError, count_of, list_names
+from truearm.errors import UsageError, WorkError, count_of, did_you_mean, list_names
 from truearm.fits.core_set import Selection, measured_points
 from truearm.fits.enough_values import setup_unknowns
 from truearm.kinds import required
@@ -46,6 +46,15 @@ class Candidates:
         object.__setattr__(self, "readings", rows)
         if self.group is not None and self.group not in known:
             raise UsageError(f'there is no set-up "{self.group}"', rule=f"There are {list_names(known)}")
+        names = self.calibration.options.features
+        for name in self.features or {}:
+            if name not in names:
+                raise UsageError(
+                    f'the calibration does not vary with "{name}"',
+                    where="features",
+                    rule=f"It varies with {list_names(names) or 'none'}",
+                    way_out=did_you_mean(name, names),
+                )
         if self.calibration.selection.distances:
             raise WorkError(
                 "this calibration was made from distances",

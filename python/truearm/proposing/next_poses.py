@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import choose_informative
-from truearm.errors import WorkError
+from truearm.errors import UsageError, WorkError
 from truearm.kinds import required
 from truearm.proposing.candidates import Candidates
 from truearm.types import AXES, Floats
@@ -46,14 +46,27 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
         count: How many.
 
     Raises:
+        UsageError: If the workspace is empty.
         WorkError: If there are too few candidates, or the calibration has no standard deviations: it is
             stripped, or of a scheme.
     """
     check_count(candidates, count)
-    where = replace(candidates, readings=workspace)
+    where = workspace_of(candidates, workspace)
     rows, variance = choose_informative(candidates.covariance(where), candidates.core(), count)
     expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
+
+
+def workspace_of(candidates: Candidates, readings: Floats) -> Candidates:
+    """The readings (t, N) at which the error counts, in the set-up of the candidates.
+
+    Raises:
+        UsageError: If there are none.
+    """
+    where = replace(candidates, readings=readings, group=candidates.set_up)
+    if len(where) == 0:
+        raise UsageError("the workspace has no poses", rule="The error is told at one or more")
+    return where
 
 
 def deviation_mm(workspace: Candidates) -> float:

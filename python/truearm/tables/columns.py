@@ -11,12 +11,12 @@ from truearm.kinds import check_choice, words
 from truearm.named_values import JOINT
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
-TARGET: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
-SIGMA: Final = re.compile(r"sigma(?:_(m|mm))?")
-DISTANCE: Final = re.compile(r"distance(?:_(m|mm))?")
+TARGET_COLUMN: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
+SIGMA_COLUMN: Final = re.compile(r"sigma(?:_(m|mm))?")
+DISTANCE_COLUMN: Final = re.compile(r"distance(?:_(m|mm))?")
 QUATERNION: Final = ("qw", "qx", "qy", "qz")
 WORDS: Final = ("group", "anchor", "pair")
-AXES: Final = "xyz"
+COORDINATES: Final = "xyz"
 PURPOSE: Final = "purpose"
 VALIDATE: Final = "validate"
 """In the column "purpose": a pose that was planned to judge by, not to fit to."""
@@ -105,8 +105,8 @@ def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str, measur
     finder = _Finder(names, stated, where)
     layout = Layout(joints=finder.joints(), targets=finder.targets())
     layout.quaternion = finder.has_quaternion()
-    layout.sigma = finder.single(SIGMA)
-    layout.distance = finder.single(DISTANCE)
+    layout.sigma = finder.single(SIGMA_COLUMN)
+    layout.distance = finder.single(DISTANCE_COLUMN)
     layout.words = tuple(word for word in WORDS if word in names)
     if measured and not layout.targets and layout.distance is None:
         raise finder.missing("z" if {"x", "y"} & set(names) else "x", "No position x, y, z and no distance")
@@ -164,10 +164,10 @@ class _Finder:
     def targets(self) -> list[tuple[Column, Column, Column]]:
         found: dict[tuple[int, str], Column] = {}
         for name in self.names:
-            match = TARGET.fullmatch(name)
+            match = TARGET_COLUMN.fullmatch(name)
             if match:
                 self._claim(found, (int(match[2] or 1), match[1]), Column(name, match[3] or ""))
-        for number, axis in [(n, a) for n in sorted({n for n, _ in found}) for a in AXES]:
+        for number, axis in [(n, a) for n in sorted({n for n, _ in found}) for a in COORDINATES]:
             if (number, axis) not in found:
                 name = axis if number == 1 else f"{axis}{number}"
                 raise self.missing(name, f'Column "{name}" is missing')
@@ -256,5 +256,5 @@ def _unit_in_words(column: Column) -> str:
 
 def means_something(name: str) -> bool:
     """Whether a column of this name is no feature: a joint, part of a measurement, or a word about it."""
-    patterns = (JOINT, TARGET, SIGMA, DISTANCE)
+    patterns = (JOINT, TARGET_COLUMN, SIGMA_COLUMN, DISTANCE_COLUMN)
     return name in QUATERNION + WORDS or any(pattern.fullmatch(name) for pattern in patterns)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from truearm.tables.reading import Column, Table, as_number
+from truearm.tables.reading import Cells, Table, as_number
 
 
 def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple[Table, tuple[str, ...]]:
@@ -18,7 +18,7 @@ def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple
     if not missing:
         return table, ()
     stated = {word: _meant(word, decimal) for word in missing}
-    columns, found = dict[str, Column](), set()
+    columns, found = dict[str, Cells](), set()
     for name in table.names:
         cells = table.cells(name)
         meant = [_meant(cell, decimal) for cell in cells]

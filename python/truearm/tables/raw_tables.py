@@ -34,6 +34,7 @@ BLANK: Final = " "
 UNNAMED: Final = "-"
 BLANKS: Final = re.compile(r"[ \t]+")
 NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
+ONE_MARK: Final = "A number has one mark, the decimal one"
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 BRACKETS: Final = ("[", "(", "{")
 BYTE_ORDER_MARK: Final = "\ufeff"
@@ -283,6 +284,14 @@ def _with_points(table: Table, name: str, options: str) -> Table:
             rule="With a decimal comma there must be no points",
             way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out {options}decimal",
         )
+    several = [row for row, cell in enumerate(cells, start=1) if cell.count(",") > 1]
+    if several:
+        raise InputError(
+            f'column "{name}" holds "{cells[several[0] - 1]}" in row {several[0]}',
+            where=table.where,
+            rule=ONE_MARK,
+            way_out=NO_THOUSANDS,
+        )
     column = np.array([cell.replace(",", ".") for cell in cells], dtype=np.object_)
     return Table(table.where, {name: column}, table.row_count)
 
@@ -309,7 +318,7 @@ def _hint(table: Table, name: str, options: str) -> UsageError | None:
     return UsageError(
         f'column "{name}" holds "{commas[0]}"',
         where=table.where,
-        rule="A number has one mark, the decimal one" if both else "",
+        rule=ONE_MARK if both else "",
         way_out=NO_THOUSANDS if both else f'If this is a decimal comma, give {options}decimal ","',
     )
 

@@ -20,7 +20,7 @@ from truearm.files import LOOKED_AT, ZIP, decode_text, name_in_text, read_bytes,
 from truearm.types import Floats, Integers, Texts
 from truearm.units import HEADER_UNITS, bare_unit
 
-Column = NDArray[np.object_] | Floats
+Cells = NDArray[np.object_] | Floats
 """Texts as objects, as in an array of texts each takes what the longest takes; or numbers."""
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
@@ -73,7 +73,7 @@ class Table:
     """
 
     where: str
-    columns: dict[str, Column]
+    columns: dict[str, Cells]
     row_count: int
     remarks: tuple[str, ...] = ()
     numbers_of_rows: Integers | None = None
@@ -186,13 +186,13 @@ def holds_units(cells: Iterable[str]) -> bool:
 
 def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
     """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
-    columns: dict[str, Column] = {}
+    columns: dict[str, Cells] = {}
     for name in frame.columns:
         column = frame[name]
         if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
             columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.object_)
+            columns[str(name)] = column.astype(str).where(column.notna(), "").to_numpy(dtype=np.object_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
     return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
@@ -317,7 +317,7 @@ def split_table(text: str, delimiter: str, *, where: str, ways_out: WaysOut = US
     if not named:
         raise InputError("no column has a name", where=where, way_out="Name the columns in the first line")
     _check_names({k + 1: header[k] for k in named}, where, ways_out.nameless)
-    columns: dict[str, Column] = {
+    columns: dict[str, Cells] = {
         header[k]: np.array([row[k] for row in rows], dtype=np.object_) for k in named
     }
     return Table(where, columns, len(rows), remarks)
@@ -415,7 +415,7 @@ def _in_words(number: float) -> str:
     """A number as a name: whole ones without a point, NaN as nothing."""
     if np.isnan(number):
         return ""
-    return str(int(number)) if number == int(number) else repr(number)
+    return str(int(number)) if number.is_integer() else repr(number)
 
 
 def as_number(text: str) -> float | None:

@@ -4,6 +4,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -43,6 +44,19 @@ def called_as_files(group: Texts, sources: Texts) -> Texts:
     return np.where(own, group, "")
 
 
+def copied_rows(data: "Measurements") -> NDArray[np.bool_]:
+    """Mask (n,) of rows that hold what an earlier one does, in a set-up of another name of a file."""
+    found = np.zeros(len(data), dtype=np.bool_)
+    called = np.flatnonzero(_called_after_file(data))
+    if len(set(data.group[called].tolist())) < 2:
+        return found
+    content = data.select(called).content()
+    measured = [name for name in content.columns if name not in NAMES]
+    first = content.groupby(measured, dropna=False, sort=False)["group0"].transform("first")
+    found[called] = (first != content["group0"]).to_numpy()
+    return found
+
+
 def told_apart(parts: Sequence["Measurements"]) -> list["Measurements"]:
     """The parts with different names for the set-ups of different files, where no column names them."""
     known: dict[str, list[Measurements]] = {}
@@ -61,14 +75,15 @@ def told_apart(parts: Sequence["Measurements"]) -> list["Measurements"]:
 
 def _own_table(part: "Measurements", known: dict[str, list["Measurements"]]) -> "Measurements":
     """The part with a name of its own for each table that is called as another one; adds to `known`."""
-    unnamed, names = _called_after_file(part), part.sources
-    for source in list(dict.fromkeys(part.sources[unnamed].tolist())):
-        mask = unnamed & (part.sources == source)
-        table = part.select(mask)
-        name = _name(table, source, known)
-        known.setdefault(name, []).append(table)
-        names = np.where(mask, name, names)
-    return _renamed(part, unnamed & (names != part.sources), sources=names)
+    called, names = _called_after_file(part), part.sources
+    for source, own in product(part.files, (called, ~called)):
+        mask = own & (part.sources == source)
+        if mask.any():
+            table = part.select(mask)
+            name = _name(table, source, known)
+            known.setdefault(name, []).append(table)
+            names = np.where(mask, name, names)
+    return _renamed(part, names != part.sources, sources=names)
 
 
 def _name(table: "Measurements", source: str, known: dict[str, list["Measurements"]]) -> str:
@@ -85,20 +100,29 @@ def _name(table: "Measurements", source: str, known: dict[str, list["Measurement
 
 
 def _are_different(table: "Measurements", other: "Measurements") -> bool:
-    """Whether two tables hold different things in a row of the same number, or nothing says they are one."""
+    """Whether two tables hold different things in a row of the same number.
+
+    Without such a row those are different whose set-ups are called after them, unless something says that
+    they are one; where a column names the set-ups, rows of unlike numbers may have come from one table.
+    """
     common, mine, others = np.intersect1d(table.rows, other.rows, return_indices=True)
     if len(common) == 0:
-        return not _share_a_table(table, other)
+        return _both_called(table, other) and not _share_a_table(table, other)
     one, another = table.select(mine).content(), other.select(others).content()
     both = [name for name in one.columns if name in another.columns and name not in NAMES]
     return not all(_agree(one[name].to_numpy(), another[name].to_numpy()) for name in both)
 
 
 def _share_a_table(table: "Measurements", other: "Measurements") -> bool:
-    """Whether rows of both were read at once from one table."""
-    if table.tables is None or other.tables is None:
+    """Whether rows of both were read at once from one table, as far as it is known of set-ups called so."""
+    if not _both_called(table, other) or table.tables is None or other.tables is None:
         return False
     return bool(np.isin(table.tables, other.tables).any())
+
+
+def _both_called(table: "Measurements", other: "Measurements") -> bool:
+    """Whether the set-ups of both tables are called after them, and not by a column."""
+    return bool(_called_after_file(table).any() and _called_after_file(other).any())
 
 
 def _agree(one: NDArray[Any], other: NDArray[Any]) -> bool:

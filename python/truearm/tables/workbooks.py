@@ -25,8 +25,8 @@ class Cell(NamedTuple):
 
 
 NOTHING: Final = Cell(None)
-Rows = list[list[Cell]]
-Sheets = dict[str, Rows]
+Sheet = list[list[Cell]]
+Sheets = dict[str, Sheet]
 
 
 def is_workbook(content: bytes) -> bool:
@@ -85,7 +85,7 @@ def _sheets(content: bytes, where: str) -> Sheets:
             ) from None
 
 
-def _cells(results: Any, formulas: Any, *, stale: bool) -> Rows:  # noqa: ANN401 - its types fit no reading
+def _cells(results: Any, formulas: Any, *, stale: bool) -> Sheet:  # noqa: ANN401 - its types fit no reading
     """Cells of a sheet from its results and its formulas; `stale`: the results are still to be worked out."""
     for sheet in (results, formulas):
         # Some programs write a wrong size of the sheet into the file.
@@ -128,7 +128,7 @@ def _only(sheets: Sheets, where: str, option: str) -> str:
     return filled[0]
 
 
-def _check_results(rows: Rows, where: str) -> None:
+def _check_results(rows: Sheet, where: str) -> None:
     """Raise InputError where a formula was never worked out: its cell would pass for empty or zero."""
     for number, row in enumerate(rows, start=1):
         for cell in row:

@@ -7,10 +7,10 @@ import numpy as np
 
 from truearm._core import Problem, linearise, setup_jacobian
 from truearm.calibration import Calibration
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.errors import Notice
 from truearm.fits.core_set import measured_points
 from truearm.judgement.judging import model_inputs
+from truearm.rows.evenly import some_rows
 from truearm.types import AXES
 from truearm.units import MM_PER_METRE
 from truearm.update_words import kept_words

@@ -4,10 +4,10 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts.nominal_misfit import some_rows
 from truearm.errors import Notice
 from truearm.fits.core_set import Selection
 from truearm.measurements import Measurements
+from truearm.rows.evenly import some_rows
 
 MOST_VALUES: Final = 1500
 """They tell offsets, frame and tool far better than the calibration's field is known: 500 points."""
