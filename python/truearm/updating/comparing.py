@@ -30,7 +30,7 @@ from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors, mean_distance
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.rows.visits import one_row_a_visit
+from truearm.rows.visits import one_row_a_visit, pose_count, pose_numbers
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
@@ -78,9 +78,9 @@ class Update:
         tools: Motions of the targets, where the calibration knows them.
         changed: The test of offsets and tool, and of the base of a known world.
         rest: The test of what is left.
-        before: Errors of the old calibration at each pose, its frame found from the others.
-        after: The same with offsets and tool found from the others too.
-        n_poses: Poses that were used, outliers among them.
+        before: Errors of the old calibration in each row, its frame found from the other poses.
+        after: The same with offsets and tool found from the other poses too.
+        n_poses: Poses that were used, outliers among them, each once however often it was visited.
         outliers: Data rows that were left out.
         notices: What the user should know.
         expected_mm: Where the old calibration holds, its expected standard deviation over the poses that it
@@ -227,7 +227,7 @@ def update(
         rows, outliers = _without_outliers(calibration, rows)
         _check_groups(rows.scene.data, task)
         found = _Found(calibration, rows, chosen, held)
-        return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
+        return found.told(data, outliers, (*notices, *_outlier_notices(data, outliers)))
 
 
 def slipped_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
@@ -266,6 +266,14 @@ class _Rows:
         scene, start = begun(whole)
         return cls(scene, start, Scatter(scene.covariance(start)))
 
+    @property
+    def visit_by_visit(self) -> "_Rows":
+        """The same, with visits to a pose that vouch for one another as poses do."""
+        scene = self.scene.visit_by_visit
+        return (
+            self if scene is self.scene else _Rows(scene, self.start, Scatter(scene.covariance(self.start)))
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _Found:
@@ -276,8 +284,8 @@ class _Found:
     options: UpdateOptions
     held: dict[int, str]
 
-    def told(self, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
-        """What the measurements say."""
+    def told(self, data: Measurements, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
+        """What the measurements say; `outliers` are the places of those among `data` that do not count."""
         scene, start, scatter = self.rows.scene, self.rows.start, self.rows.scatter
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
@@ -307,8 +315,8 @@ class _Found:
             rest=rest,
             before=errors_at_left_out(scene, still, anew).statistics(),
             after=judged[self.calibration.model_name].statistics(),
-            n_poses=len(scene.data) + len(outliers),
-            outliers=tuple(outliers),
+            n_poses=pose_count(data),
+            outliers=tuple(data.rows[outliers].tolist()),
             notices=notices,
         )
         report = {**told.to_dict(), "options": asdict(self.options)}
@@ -402,15 +410,16 @@ def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, option
 
 
 def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
-    scene_values = 3 * int(data.seen(task.selection.targets).sum())
-    if task.selection.orientation:
-        scene_values += 3 * int(data.oriented.sum())
+    poses = pose_numbers(data.readings, data.group)
+    seen = np.column_stack([data.seen(task.selection.targets), data.oriented & task.selection.orientation])
+    count = len(np.unique(poses))
+    values = 3 * len(np.unique((poses[:, None] + len(data) * np.arange(seen.shape[1]))[seen]))
     wanted = int(unknowns.free.sum())
-    if scene_values > wanted:
+    if values > wanted:
         return
-    per_pose = max(scene_values // max(len(data), 1), 1)
+    per_pose = max(values // max(count, 1), 1)
     raise TooFewError(
-        f"{scene_values} measured values in {count_of(len(data), 'pose')} cannot tell {wanted} unknowns of "
+        f"{values} measured values in {count_of(count, 'pose')} cannot tell {wanted} unknowns of "
         "offsets, frame and tool",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
@@ -421,10 +430,10 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 
 def _check_groups(data: Measurements, task: Task) -> None:
     """Each pose is judged by the others: they have to find its frame and target."""
-    fewest = FOUND_FROM + -(-len(data) // MOST_PARTS)
-    seen = data.seen(task.selection.targets).any(axis=1)
+    poses, seen = pose_numbers(data.readings, data.group), data.seen(task.selection.targets).any(axis=1)
+    fewest = FOUND_FROM + -(-len(np.unique(poses)) // MOST_PARTS)
     for group in task.groups:
-        count = int((seen & (data.group == group)).sum())
+        count = len(np.unique(poses[seen & (data.group == group)]))
         if count < fewest:
             raise TooFewError(
                 f"{count_of(count, 'pose')} of set-up {list_names([group])}",
@@ -444,7 +453,8 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
     kept, out = np.arange(len(whole.data)), list[int]()
     most = int(MOST_OUTLIERS * len(whole.data))
     while True:
-        found = estimate(rows.scene, rows.scatter, rows.start, free)
+        judged = rows.visit_by_visit
+        found = estimate(judged.scene, judged.scatter, judged.start, free)
         alone = unsupported(found, std, free, most + 1 - len(out))
         if not alone:
             return rows, out

@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
@@ -18,8 +17,10 @@ from truearm.fits.fitting import Task, core_errors, fit_options
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
-from truearm.types import Floats, Mask
+from truearm.rows.visits import pose_numbers
+from truearm.types import Floats, Mask, Rows
 from truearm.updating.parts import part_of, places_of
+from truearm.updating.revisits import UNSEEN, Apart
 from truearm.updating.scale import known_scale, sigmas_m
 from truearm.updating.unknowns import Unknowns, is_part_of
 
@@ -43,13 +44,17 @@ class Linear:
         residual: Measured minus predicted (R,), m and rad.
         jacobian: Derivatives (R, u) of the prediction by the unknowns.
         departure: How far the unknowns are from where their priors have them (u,).
-        pose: Pose of each value (R,).
+        visit: Row of each value (R,), a visit to a pose.
+        pose: Number of its pose (R,).
+        part: Which of the values of a pose it is (R,).
     """
 
     residual: Floats
     jacobian: Floats
     departure: Floats
-    pose: NDArray[np.int64]
+    visit: Rows
+    pose: Rows
+    part: Rows
 
 
 class Scene:
@@ -61,6 +66,7 @@ class Scene:
         calibration: As it was.
         unknowns: What may have moved.
         about: Set-ups that what is found anew is held at, ever so gently; without them those of `found_free`.
+        apart: How far visits to a pose differ.
     """
 
     def __init__(
@@ -70,10 +76,12 @@ class Scene:
         calibration: Calibration,
         unknowns: Unknowns,
         about: Setup | None = None,
+        apart: Apart = UNSEEN,
     ) -> None:
         model = calibration.model
         self._calibration, self._about = calibration, about
-        self.task, self.data, self.unknowns = task, data, unknowns
+        self.task, self.data, self.unknowns, self.apart = task, data, unknowns, apart
+        self.poses = pose_numbers(data.readings, data.group)
         self._known, self._row_of_base = model.setup, model.constants[0]
         if is_part_of(task.selection, calibration.selection):
             self._known = part_of(model.setup, task.selection, calibration.selection)
@@ -90,9 +98,30 @@ class Scene:
         setup = self._with_known(self.found_free, self.unknowns.anew)
         return State(np.zeros(len(self.unknowns.arm_names)), setup)
 
-    def about(self, setup: Setup) -> "Scene":
-        """The same rows, with what is found anew held at other set-ups."""
-        return Scene(self.task, self.data, self._calibration, self.unknowns, setup)
+    def about(self, setup: Setup | None, apart: Apart) -> "Scene":
+        """The same rows, with what is found anew held at other set-ups, and visits so far apart."""
+        return Scene(self.task, self.data, self._calibration, self.unknowns, setup, apart)
+
+    def begun(self, state: State) -> "Scene":
+        """The same rows, with what is found anew held where it is in a state, and visits to a pose as far
+        apart as it leaves them.
+        """
+        _, residual = linearise(self.problem, self._moved_parameters(state), state.setup)
+        noise, stated, finest = (np.diagonal(each, axis1=-2, axis2=-1) for each in self._noise(state))
+        variances = np.maximum(noise, finest), stated + finest
+        apart = Apart.seen(residual, self.seen, self.poses, variances, self.orientation)
+        return self.about(state.setup, apart)
+
+    @property
+    def visit_by_visit(self) -> "Scene":
+        """The same rows, with visits to a pose that vouch for one another as poses do."""
+        apart = self.apart.without_common
+        return self if apart == self.apart else self.about(self._about, apart)
+
+    @property
+    def pose_count(self) -> int:
+        """How many poses the rows are visits to."""
+        return len(np.unique(self.poses))
 
     @cached_property
     def found_free(self) -> Setup:
@@ -121,8 +150,9 @@ class Scene:
         arm, residual = linearise(self.problem, parameters, state.setup)
         jacobian = np.concatenate([arm @ unknowns.directions, self._setup_jacobian(state)], axis=2)
         seen = self.seen
-        pose = np.repeat(np.arange(len(residual)), residual.shape[1]).reshape(residual.shape)
-        return Linear(residual[seen], jacobian[seen], self.departure(state), pose[seen])
+        visit, part = np.nonzero(seen)
+        departure = self.departure(state)
+        return Linear(residual[seen], jacobian[seen], departure, visit, self.poses[visit], part)
 
     def departure(self, state: State) -> Floats:
         """How far the unknowns (u,) of a state are from where their priors have them.
@@ -170,14 +200,24 @@ class Scene:
     def scatter(self, state: State) -> Floats:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
 
+        What no constants explain, or a joint does not repeat, is partly the pose's: its visits share it.
+        """
+        noise, stated, finest = self._noise(state)
+        seen = self.seen.reshape(-1)
+        whole = block_diag(*(self.apart.noise(noise, stated, self.orientation) + finest))
+        whole += self.apart.in_common(noise, self.poses)
+        return np.asarray(whole[np.ix_(seen, seen)])
+
+    def _noise(self, state: State) -> tuple[Floats, Floats, Floats]:
+        """Covariances (n, m, m) of what each row shows anew, the noise and what it states beyond that, and
+        the least (m, m) there is.
+
         Noise of computed rows is next to nothing; that they are off by less than FINEST tells of no arm.
         """
         noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
-        seen = self.seen.reshape(-1)
-        own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
+        stated = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
         finest = FINEST**2 * np.eye(len(self.orientation))
-        whole = block_diag(*(self._widened**2 * (noise + own) + finest))
-        return np.asarray(whole[np.ix_(seen, seen)])
+        return self._widened**2 * noise, self._widened**2 * stated, finest
 
     def _stated_beyond_noise(self) -> Floats:
         """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.

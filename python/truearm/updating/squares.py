@@ -57,7 +57,10 @@ def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresT
 
 
 def rest_test(estimated: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
-    """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave."""
+    """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave.
+
+    What visits to a pose differ by, which says how far they scatter, is no part of it.
+    """
     residual, free = _whitened(estimated, unknowns, unknowns.free)
     out = _basis(free, NEGLIGIBLE)
     return SquaresTest.of(residual - out @ (out.T @ residual), len(residual) - out.shape[1], known)
@@ -74,10 +77,16 @@ def wald(change: Floats, covariance: Floats, known: int) -> SquaresTest:
 
 
 def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Floats, Floats]:
-    """Residuals (R,) and columns of the chosen unknowns (R, k) in standard deviations, of both."""
-    columns = estimate.linear.jacobian[:, chosen] * unknowns.std[chosen]
-    both = np.column_stack([estimate.linear.residual, columns])
-    whitened = estimate.scatter.whitened(both)
+    """Residuals (r,) and columns of the chosen unknowns (r, k) in standard deviations, of both: of all visits
+    to a pose as of one, which is their mean.
+    """
+    linear = estimate.linear
+    columns = linear.jacobian[:, chosen] * unknowns.std[chosen]
+    whitened = estimate.scatter.whitened(np.column_stack([linear.residual, columns]))
+    of_pose, value = np.unique(np.column_stack([linear.pose, linear.part]), axis=0, return_inverse=True)
+    if len(of_pose) < len(linear.residual):
+        alike = np.equal.outer(value.reshape(-1), np.arange(len(of_pose))).astype(np.float64)
+        whitened = np.linalg.qr(estimate.scatter.whitened(alike))[0].T @ whitened
     return whitened[:, 0], whitened[:, 1:]
 
 

@@ -62,8 +62,8 @@ class _Left:
         linear = found.linear
         metric, residual = unexplained(found, std, free)
         gain = found.covariance @ linear.jacobian.T @ found.scatter.precision
-        bound = overwhelming(np.bincount(linear.pose))
-        return cls(residual, metric, gain, linear.pose, bound, np.zeros(len(gain)))
+        bound = overwhelming(np.bincount(linear.visit))
+        return cls(residual, metric, gain, linear.visit, bound, np.zeros(len(gain)))
 
     def worst(self) -> tuple[int, float]:
         """The pose that is the most unlikely given all others, and how many times what is allowed for."""
