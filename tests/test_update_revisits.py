@@ -103,3 +103,12 @@ def test_poses_that_were_visited_once_have_all_their_noise():
     poses, residual = scattered(1, 0.5)
     held, noise = np.ones(residual.shape, dtype=bool), np.full(residual.shape, NOISE)
     assert Apart.seen(residual, held, poses, (noise, noise), np.zeros(3, dtype=bool)) == UNSEEN
+
+
+def test_all_shots_of_a_visit_that_is_left_out_are_named(arm, constant):
+    table = arm.measure_table(np.repeat(arm.poses(12, seed=70), 3, axis=0))
+    table.loc[12:14, "x"] += 0.004
+    found = ta.update(constant, ta.Measurements.from_dataframe(table))
+    assert found.outliers == (13, 14, 15)
+    assert "rows 13, 14 and 15" in str(found.notices[0])
+    assert found.n_poses == 12

@@ -25,15 +25,17 @@ from truearm.errors import (
     list_names,
 )
 from truearm.fits.core_set import Use, select_fitted
+from truearm.fits.enough_values import measured_values
 from truearm.fits.fitted_rows import known_rows
 from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors, mean_distance
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.rows.visits import one_row_a_visit, pose_count, pose_numbers
+from truearm.rows.visits import one_row_a_visit, pose_count
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
+from truearm.types import Rows
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.certainty import expected_mm, less_certain
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate
@@ -41,6 +43,7 @@ from truearm.updating.kept_parts import KeptParts
 from truearm.updating.meanwhile import meanwhile
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
+from truearm.updating.revisits import shots_of
 from truearm.updating.scale import known_scale, silent_rows
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
@@ -81,7 +84,7 @@ class Update:
         before: Errors of the old calibration in each row, its frame found from the other poses.
         after: The same with offsets and tool found from the other poses too.
         n_poses: Poses that were used, outliers among them, each once however often it was visited.
-        outliers: Data rows that were left out.
+        outliers: Data rows that were left out, of a visit all its shots.
         notices: What the user should know.
         expected_mm: Where the old calibration holds, its expected standard deviation over the poses that it
             was learned from, and that of the updated one, of what frame and target, found anew, do not take
@@ -205,9 +208,9 @@ def update(
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     data, notices = admitted(data, calibration.robot)
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
-    data = one_row_a_visit(data)
-    task, left_out = _task(calibration, data, chosen, stages)
-    data, unused = some_poses(data, task.selection)
+    given, merged = data, one_row_a_visit(data)
+    task, left_out = _task(calibration, merged, chosen, stages)
+    data, unused = some_poses(merged, task.selection)
     if unused:
         task, left_out = _task(calibration, data, chosen, stages)
     notices += [*unused, *silent_rows(calibration, data), *left_out]
@@ -227,7 +230,9 @@ def update(
         rows, outliers = _without_outliers(calibration, rows)
         _check_groups(rows.scene.data, task)
         found = _Found(calibration, rows, chosen, held)
-        return found.told(data, outliers, (*notices, *_outlier_notices(data, outliers)))
+        shots = shots_of(data.select(outliers), merged, given)
+        told = (*notices, *_outlier_notices(given, shots))
+        return found.told(pose_count(data), given.rows[shots].tolist(), told)
 
 
 def slipped_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
@@ -284,8 +289,8 @@ class _Found:
     options: UpdateOptions
     held: dict[int, str]
 
-    def told(self, data: Measurements, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
-        """What the measurements say; `outliers` are the places of those among `data` that do not count."""
+    def told(self, poses: int, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
+        """What the measurements say, from so many poses; `outliers` are the rows that do not count."""
         scene, start, scatter = self.rows.scene, self.rows.start, self.rows.scatter
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
@@ -315,8 +320,8 @@ class _Found:
             rest=rest,
             before=errors_at_left_out(scene, still, anew).statistics(),
             after=judged[self.calibration.model_name].statistics(),
-            n_poses=pose_count(data),
-            outliers=tuple(data.rows[outliers].tolist()),
+            n_poses=poses,
+            outliers=tuple(outliers),
             notices=notices,
         )
         report = {**told.to_dict(), "options": asdict(self.options)}
@@ -410,13 +415,10 @@ def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, option
 
 
 def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
-    poses = pose_numbers(data.readings, data.group)
-    seen = np.column_stack([data.seen(task.selection.targets), data.oriented & task.selection.orientation])
-    count = len(np.unique(poses))
-    values = 3 * len(np.unique((poses[:, None] + len(data) * np.arange(seen.shape[1]))[seen]))
-    wanted = int(unknowns.free.sum())
+    values, wanted = measured_values(task, data), int(unknowns.free.sum())
     if values > wanted:
         return
+    count = pose_count(data)
     per_pose = max(values // max(count, 1), 1)
     raise TooFewError(
         f"{values} measured values in {count_of(count, 'pose')} cannot tell {wanted} unknowns of "
@@ -430,10 +432,10 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 
 def _check_groups(data: Measurements, task: Task) -> None:
     """Each pose is judged by the others: they have to find its frame and target."""
-    poses, seen = pose_numbers(data.readings, data.group), data.seen(task.selection.targets).any(axis=1)
-    fewest = FOUND_FROM + -(-len(np.unique(poses)) // MOST_PARTS)
+    fewest = FOUND_FROM + -(-pose_count(data) // MOST_PARTS)
+    seen = data.seen(task.selection.targets).any(axis=1)
     for group in task.groups:
-        count = len(np.unique(poses[seen & (data.group == group)]))
+        count = pose_count(data.select(seen & (data.group == group)))
         if count < fewest:
             raise TooFewError(
                 f"{count_of(count, 'pose')} of set-up {list_names([group])}",
@@ -465,8 +467,8 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
         rows = _Rows.of(Scene(whole.task, whole.data.select(kept), calibration, whole.unknowns))
 
 
-def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
-    if not outliers:
+def _outlier_notices(data: Measurements, outliers: Rows) -> list[Notice]:
+    if not len(outliers):
         return []
     which = np.isin(np.arange(len(data)), outliers)
     text = f"No other pose supports what was measured in {data.row_names(which)}: left out."

@@ -6,8 +6,7 @@ import numpy as np
 
 from truearm.doubts.at_once import BESIDE, Left
 from truearm.doubts.slips import Derivatives, Session, Slip, slips_of
-from truearm.drifting import Drift
-from truearm.fits.enough_values import FRAME_UNKNOWNS
+from truearm.drifting import progress_of
 from truearm.types import Floats, Rows
 from truearm.updating.estimating import Estimate, unexplained
 from truearm.updating.scene import Scene
@@ -25,7 +24,7 @@ def _sessions(scene: Scene, found: Estimate) -> Iterator[Session]:
     pull, noise = metric @ residual, scene.scatter(found.state)
     freedom = float(len(residual) - unknowns.free.sum())
     is_point = np.broadcast_to(~scene.orientation, scene.seen.shape)[scene.seen]
-    progress, frame = Drift.none(scene.data).progress, 0 if task.arm.world_is_known else FRAME_UNKNOWNS
+    progress = progress_of(scene.data)
     for number in range(len(task.groups)):
         values = np.flatnonzero(scene.number[linear.visit] == number)
         values = values[np.argsort(progress[linear.visit[values]], kind="stable")]
@@ -39,7 +38,7 @@ def _sessions(scene: Scene, found: Estimate) -> Iterator[Session]:
             linear.jacobian[values][:, unknowns.group(number)],
             linear.jacobian[values, : task.arm.robot.joint_count],
             is_point[values],
-            frame,
+            task.arm.frame_unknowns,
             task.selection.targets,
         )
         several = len(task.groups) > 1

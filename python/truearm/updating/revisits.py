@@ -5,6 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from truearm.measurements import Measurements
+from truearm.rows.visits import visit_numbers
 from truearm.types import Floats, Mask, Rows
 
 LEAST_APART: Final = 1e-6
@@ -96,3 +98,24 @@ def _of_half(squares: Floats, known: Floats, chosen: Mask) -> float:
     typical = values / (2.0 * gammaincinv(np.maximum(values, 1) / 2.0, 0.5))
     beyond = typical * (squares * chosen).sum(axis=1) - (known * chosen).sum(axis=1)
     return float(np.median((beyond / np.maximum(values, 1))[values > 0]))
+
+
+def shots_of(visits: Measurements, merged: Measurements, given: Measurements) -> Rows:
+    """Places among the given rows of those that some visits, a part of those `merged`, are the means of:
+    visit after visit, its shots in the order of measuring.
+    """
+    kin = np.char.add(np.char.add(given.sources, "\n"), given.group)
+    held = np.column_stack([visit_numbers(given.readings, kin), given.seen(), given.oriented])
+    names = _names(given)
+    place = {name: k for k, name in enumerate(names)}
+    further = ~np.isin(np.arange(len(given)), [place[name] for name in _names(merged)])
+    found = [np.zeros(0, dtype=np.int64)]
+    for name in _names(visits):
+        own = (held == held[place[name]]).all(axis=1) & further
+        found.append(np.append(place[name], np.flatnonzero(own)))
+    return np.concatenate(found)
+
+
+def _names(data: Measurements) -> list[tuple[str, int]]:
+    """File and row of each row (n,)."""
+    return list(zip(data.sources.tolist(), data.rows.tolist(), strict=True))

@@ -12,8 +12,9 @@ from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import FINEST, noises_of, task_of
 from truearm.description.dh_row import row_transform
 from truearm.fits.core_set import core_set, rotations
-from truearm.fits.enough_values import FRAME_UNKNOWNS, setup_unknowns
+from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitting import Task, core_errors, fit_options
+from truearm.fits.known_scale import usual_sigma
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
@@ -176,7 +177,7 @@ class Scene:
         if known is None:
             return None, None
         moved = self._between(self._known, known, state.setup, number)
-        frame = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
+        frame = self.task.arm.frame_unknowns
         return (moved[:frame] if frame else None), moved[frame:]
 
     def base_motion(self, change: Floats) -> Floats:
@@ -222,13 +223,13 @@ class Scene:
     def _stated_beyond_noise(self) -> Floats:
         """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.
 
-        It does where the calibration's own rows stated none: then the larger of both counts. What constants
-        alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of the
-        calibration were, whose noise is what they left beyond their own.
+        It does where most of the calibration's own rows stated none: then the larger of both counts. What
+        constants alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of
+        the calibration were, whose noise is what they left beyond their own.
         """
         stated, details = sigmas_m(self._calibration, self.data) ** 2, self._calibration.variable
         learned = self._calibration.learned_from
-        if details is None or learned is None or learned.data.sigma_m is not None:
+        if details is None or learned is None or usual_sigma(learned.data.stated_sigma_m) > 0.0:
             return stated
         noise, _ = noises_of(details.hyper)
         return np.maximum(stated - (details.inflation * noise) ** 2, 0.0)
