@@ -93,16 +93,15 @@ def test_visits_are_as_far_apart_as_most_of_them_are_seen_to_be(deviation, far):
     poses, residual = scattered(3, deviation)
     residual[4] += far
     held, noise = np.ones(residual.shape, dtype=bool), np.full(residual.shape, NOISE)
-    apart = Apart.seen(residual, held, poses, (noise, np.zeros_like(noise)), np.zeros(3, dtype=bool))
-    seen = apart.part * NOISE + apart.beyond[0]
-    assert seen == pytest.approx(deviation**2, rel=0.25)
-    assert (apart.part == 1.0) == (deviation**2 > NOISE)
+    apart = Apart.of(residual, held, poses, (noise, np.zeros_like(noise)), np.zeros(3, dtype=bool))
+    assert apart.seen == (pytest.approx(deviation**2, rel=0.25), 0.0)
+    assert apart.part == pytest.approx(min(deviation**2 / NOISE, 1.0), rel=0.25)
 
 
 def test_poses_that_were_visited_once_have_all_their_noise():
     poses, residual = scattered(1, 0.5)
     held, noise = np.ones(residual.shape, dtype=bool), np.full(residual.shape, NOISE)
-    assert Apart.seen(residual, held, poses, (noise, noise), np.zeros(3, dtype=bool)) == UNSEEN
+    assert Apart.of(residual, held, poses, (noise, noise), np.zeros(3, dtype=bool)) == UNSEEN
 
 
 def test_all_shots_of_a_visit_that_is_left_out_are_named(arm, constant):

@@ -21,15 +21,16 @@ class Apart:
 
     Attributes:
         part: Part of the noise that each visit has of its own; what else there is of it they share.
-        beyond: Variances of positions, m^2, and of orientations, rad^2, that each has beside all of the
-            noise: of poses that were visited once, a calibration may take noise for its field.
+        seen: Variances of positions, m^2, and of orientations, rad^2, that visits differ by. Each has them
+            beside its noise where it shares none: of poses that were visited once, a calibration may take
+            noise for its field, or that of the device for that of joints.
     """
 
     part: float = 1.0
-    beyond: tuple[float, float] = (0.0, 0.0)
+    seen: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def seen(
+    def of(
         cls, residual: Floats, held: Mask, poses: Rows, variances: tuple[Floats, Floats], orientation: Mask
     ) -> "Apart":
         """What half of the visits differ by, or less: one that is far off tells nothing of the others.
@@ -53,21 +54,20 @@ class Apart:
         squares = np.square(residual - sums[pose] / count) * count / (count - 1.0)
         noise, stated = variances
         part = _of_half(squares / noise, stated / noise, again)
-        if part <= 1.0:
-            return cls(max(part, LEAST_APART))
         kinds = (again & ~orientation, again & orientation)
-        points, turns = (max(_of_half(squares, noise + stated, kind), 0.0) for kind in kinds)
-        return cls(1.0, (points, turns))
+        points, turns = (max(_of_half(squares, stated, kind), 0.0) for kind in kinds)
+        return cls(min(max(part, LEAST_APART), 1.0), (points, turns))
 
     @property
     def without_common(self) -> "Apart":
         """The same where visits to a pose vouch for one another as poses do."""
-        return Apart(1.0, self.beyond)
+        return Apart(1.0, self.seen)
 
     def noise(self, noise: Floats, stated: Floats, orientation: Mask) -> Floats:
         """Covariances (n, m, m) of what each visit has of its own, from those of noise and what is stated."""
-        beyond = np.diag(np.where(orientation, *self.beyond[::-1]))
-        return np.asarray(self.part * noise + stated + beyond)
+        if self.part < 1.0:
+            return np.asarray(self.part * noise + stated)
+        return np.asarray(noise + stated + np.diag(np.where(orientation, *self.seen[::-1])))
 
     def in_common(self, noise: Floats, poses: Rows) -> Floats:
         """Covariance (n m, n m) of what visits to a pose share.

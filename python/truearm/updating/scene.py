@@ -110,7 +110,7 @@ class Scene:
         _, residual = linearise(self.problem, self._moved_parameters(state), state.setup)
         noise, stated, finest = (np.diagonal(each, axis1=-2, axis2=-1) for each in self._noise(state))
         variances = np.maximum(noise, finest), stated + finest
-        apart = Apart.seen(residual, self.seen, self.poses, variances, self.orientation)
+        apart = Apart.of(residual, self.seen, self.poses, variances, self.orientation)
         return self.about(state.setup, apart)
 
     @property
