@@ -82,6 +82,16 @@ def test_poses_that_took_turns_are_no_step_in_time(arm, constant):
     assert (found.verdict, found.changed_meanwhile) == ("holds", False)
 
 
+def test_play_that_no_calibration_expects_is_no_noise_of_visits(arm, constant):
+    there = looped(arm, 12, 1)
+    poses = np.concatenate([there, there[::-1]])
+    way = np.random.default_rng(1).choice([-1.0, 1.0], len(poses))
+    table = arm.measure_table(poses + np.radians([[0, 0.05, 0, 0, 0, 0]]) * way[:, None])
+    for joint, column in enumerate(poses.T, start=1):
+        table[f"q{joint}"] = column
+    assert ta.update(constant, ta.Measurements.from_dataframe(table)).verdict == "field"
+
+
 def scattered(visits, deviation):
     rng = np.random.default_rng(3)
     poses = np.repeat(np.arange(40), visits)

@@ -1,6 +1,6 @@
 """Visits to one pose: what a calibration misses there they have in common, and noise is each one's own."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,10 +24,12 @@ class Apart:
         seen: Variances of positions, m^2, and of orientations, rad^2, that visits differ by. Each has them
             beside its noise where it shares none: of poses that were visited once, a calibration may take
             noise for its field, or that of the device for that of joints.
+        contradict: Whether they differ by more than that: by more than the calibration leaves uncertain.
     """
 
     part: float = 1.0
     seen: tuple[float, float] = (0.0, 0.0)
+    contradict: bool = False
 
     @classmethod
     def of(
@@ -58,10 +60,21 @@ class Apart:
         points, turns = (max(_of_half(squares, stated, kind), 0.0) for kind in kinds)
         return cls(min(max(part, LEAST_APART), 1.0), (points, turns))
 
+    def limited(self, expected: Floats, orientation: Mask) -> "Apart":
+        """The same of visits that differ by no more than poses do, which calibration and noise leave with
+        variances (n, m); `orientation` (m,) tells those in rad.
+        """
+        most = [
+            float(np.nanmedian(expected[:, kind])) if kind.any() else 0.0
+            for kind in (~orientation, orientation)
+        ]
+        points, turns = (min(pair) for pair in zip(self.seen, most, strict=True))
+        return Apart(self.part, (points, turns), (points, turns) != self.seen)
+
     @property
     def without_common(self) -> "Apart":
         """The same where visits to a pose vouch for one another as poses do."""
-        return Apart(1.0, self.seen)
+        return replace(self, part=1.0)
 
     def noise(self, noise: Floats, stated: Floats, orientation: Mask) -> Floats:
         """Covariances (n, m, m) of what each visit has of its own, from those of noise and what is stated."""

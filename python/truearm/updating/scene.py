@@ -47,7 +47,8 @@ class Linear:
         departure: How far the unknowns are from where their priors have them (u,).
         visit: Row of each value (R,), a visit to a pose.
         pose: Number of its pose (R,).
-        part: Which of the values of a pose it is (R,).
+        quantity: Number of what it is a measurement of (R,): of visits to a pose the same, unless they
+            contradict the calibration.
     """
 
     residual: Floats
@@ -55,7 +56,7 @@ class Linear:
     departure: Floats
     visit: Rows
     pose: Rows
-    part: Rows
+    quantity: Rows
 
 
 class Scene:
@@ -111,6 +112,10 @@ class Scene:
         noise, stated, finest = (np.diagonal(each, axis1=-2, axis2=-1) for each in self._noise(state))
         variances = np.maximum(noise, finest), stated + finest
         apart = Apart.of(residual, self.seen, self.poses, variances, self.orientation)
+        if apart.part >= 1.0 and any(apart.seen):
+            expected = np.full(self.seen.shape, np.nan)
+            expected[self.seen] = np.diagonal(self.covariance(state))
+            apart = apart.limited(expected, self.orientation)
         return self.about(state.setup, apart)
 
     @property
@@ -152,8 +157,12 @@ class Scene:
         jacobian = np.concatenate([arm @ unknowns.directions, self._setup_jacobian(state)], axis=2)
         seen = self.seen
         visit, part = np.nonzero(seen)
+        pose = np.arange(len(seen)) if self.apart.contradict else self.poses
+        _, quantity = np.unique(pose[visit] * seen.shape[1] + part, return_inverse=True)
         departure = self.departure(state)
-        return Linear(residual[seen], jacobian[seen], departure, visit, self.poses[visit], part)
+        return Linear(
+            residual[seen], jacobian[seen], departure, visit, self.poses[visit], quantity.reshape(-1)
+        )
 
     def departure(self, state: State) -> Floats:
         """How far the unknowns (u,) of a state are from where their priors have them.

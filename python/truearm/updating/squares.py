@@ -59,7 +59,8 @@ def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresT
 def rest_test(estimated: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
     """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave.
 
-    What visits to a pose differ by, which says how far they scatter, is no part of it.
+    What visits to a pose differ by, which says how far they scatter, is no part of it, unless that is more
+    than calibration and noise leave.
     """
     residual, free = _whitened(estimated, unknowns, unknowns.free)
     out = _basis(free, NEGLIGIBLE)
@@ -83,9 +84,9 @@ def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Flo
     linear = estimate.linear
     columns = linear.jacobian[:, chosen] * unknowns.std[chosen]
     whitened = estimate.scatter.whitened(np.column_stack([linear.residual, columns]))
-    of_pose, value = np.unique(np.column_stack([linear.pose, linear.part]), axis=0, return_inverse=True)
-    if len(of_pose) < len(linear.residual):
-        alike = np.equal.outer(value.reshape(-1), np.arange(len(of_pose))).astype(np.float64)
+    count = int(linear.quantity.max()) + 1
+    if count < len(linear.residual):
+        alike = np.equal.outer(linear.quantity, np.arange(count)).astype(np.float64)
         whitened = np.linalg.qr(estimate.scatter.whitened(alike))[0].T @ whitened
     return whitened[:, 0], whitened[:, 1:]
 
