@@ -25,15 +25,19 @@ UNKNOWNS = 5
 NOWHERE = Setup(np.eye(4)[None], np.zeros((1, 1, 3)), np.eye(3)[None], np.zeros((0, 3)))
 
 
+def linear_of(residual, jacobian, departure, pose):
+    """Values of poses that were visited once."""
+    return Linear(residual, jacobian, departure, pose, pose, np.arange(len(pose)))
+
+
 @pytest.fixture(scope="module")
 def scene():
     """Random rows of poses with two or three values each, one of five unknowns kept."""
     rng = np.random.default_rng(7)
     pose = np.repeat(np.arange(POSES), rng.integers(2, 4, POSES))
     root = rng.normal(size=(len(pose), len(pose) + 5))
-    linear = Linear(
-        rng.normal(size=len(pose)), rng.normal(size=(len(pose), UNKNOWNS)), rng.normal(size=UNKNOWNS), pose
-    )
+    residual, jacobian = rng.normal(size=len(pose)), rng.normal(size=(len(pose), UNKNOWNS))
+    linear = linear_of(residual, jacobian, rng.normal(size=UNKNOWNS), pose)
     return linear, root @ root.T / len(pose), rng.uniform(0.5, 2.0, UNKNOWNS), np.arange(UNKNOWNS) != 2
 
 
@@ -43,7 +47,7 @@ def estimated(linear, covariance, std, free):
 
 
 def of_rows(linear, chosen):
-    return Linear(linear.residual[chosen], linear.jacobian[chosen], linear.departure, linear.pose[chosen])
+    return linear_of(linear.residual[chosen], linear.jacobian[chosen], linear.departure, linear.pose[chosen])
 
 
 def test_steps_of_folds_are_those_of_the_other_poses_alone(scene):
@@ -88,7 +92,7 @@ def spoilt(scene, reach):
     residual = linear.residual.copy()
     for pose, off in ((3, 40.0), (11, -60.0), (12, 25.0), (30, 90.0)):
         residual[linear.pose == pose] += off
-    spoilt = Linear(residual, linear.jacobian / reach, np.zeros(UNKNOWNS), linear.pose)
+    spoilt = linear_of(residual, linear.jacobian / reach, np.zeros(UNKNOWNS), linear.pose)
     return spoilt, covariance, std, free
 
 
@@ -133,7 +137,7 @@ def test_a_covariance_that_is_none_is_refused_with_the_way_out():
 
 def test_rows_without_noise_leave_the_prior_what_they_do_not_tell():
     exact, std, free = 1e-11, np.array([1.0, 1.0]), np.array([True, True])
-    linear = Linear(np.full(4, 2.0), np.ones((4, 2)), np.array([0.5, -0.5]), np.arange(4))
+    linear = linear_of(np.full(4, 2.0), np.ones((4, 2)), np.array([0.5, -0.5]), np.arange(4))
     scatter = Scatter(exact**2 * np.eye(4))
     found = posterior(linear, scatter, std, free)
     np.testing.assert_allclose(found, 0.5 * np.array([[1.0, -1.0], [-1.0, 1.0]]), atol=1e-9)

@@ -1,10 +1,12 @@
 """What the rows of an update state as their sigma, beside the noise of the calibration."""
 
+import numpy as np
 import pytest
 
 import truearm as ta
 from tests.remastered import remastered_table
 from truearm.certainty.uncertainty import noises_of
+from truearm.fits.known_scale import KnownScale
 from truearm.proposing import Candidates, acceptance_poses
 from truearm.simulation import VirtualArm
 from truearm.storage import calibration_content
@@ -119,3 +121,9 @@ def test_poses_promise_no_more_than_the_device_that_was_stated_shows(arm):
     stated = ta.calibrate(arm.robot, of(rows), model="constant")
     noise = Candidates(stated, arm.poses(3)).noise
     assert noise[0, 0, 0] == pytest.approx(stated.constant.noise_m**2 + 0.3e-3**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("stating", "usual"), [(1, 0.0), (20, 0.0), (21, 5e-4), (40, 5e-4)])
+def test_a_few_rows_that_state_a_sigma_do_not_speak_for_the_others(stating, usual):
+    stated = np.where(np.arange(40) < stating, 5e-4, np.nan)
+    assert KnownScale.of(np.ones((40, 3)), 15, stated, 0.0).sigma_m == usual

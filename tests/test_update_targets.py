@@ -90,3 +90,13 @@ def test_targets_that_differ_by_nothing_have_noise_of_their_own(known):
     noise = spread.noise(np.zeros((1, 9, 1)), np.zeros(9, dtype=np.bool_))[0]
     assert np.linalg.eigvalsh(noise).min() > 0.0
     assert np.isfinite(np.linalg.cholesky(np.linalg.inv(noise))).all()
+
+
+def test_a_target_that_the_calibration_does_not_know_is_left_out(known):
+    arm, _ = known
+    one = ta.calibrate(arm.robot, with_targets(arm, 50, 1), model="constant", use="position")
+    data = with_targets(arm, 14, 10)
+    found = ta.update(one, data)
+    assert found.tested == ("offsets", "tool")
+    assert str(found.notices[0]) == "Not used: target 2, target 3, which took no part in the calibration."
+    assert ta.update(one, data, keep_tool=True).kept == ("tool",)

@@ -469,3 +469,12 @@ def test_poses_of_many_values_are_fewer_but_never_less_than_twenty(known):
     assert len(used) == MOST_VALUES // 15
     used, _ = some_poses(data, Selection(tuple(range(MOST_VALUES))))
     assert len(used) == FEWEST_OF_A_GROUP
+
+
+@pytest.mark.parametrize("allowed", [{"offset_deg": 60.0}, {"tool_mm": 1000.0}])
+def test_what_may_have_moved_far_is_compared_too(known, moved, allowed):
+    found = ta.update(known[1], moved[0], **allowed)
+    assert found.verdict == "moved"
+    assert [offset.joint for offset in found.offsets if offset.moved] == [2, 3, 4]
+    assert found.tools[0].p is not None
+    assert found.changed.freedom > 3

@@ -82,7 +82,7 @@ class Drift:
     @classmethod
     def none(cls, data: Measurements) -> "Drift":
         """No drift of these rows."""
-        return cls(np.zeros((len(data), 3)), _progress(data))
+        return cls(np.zeros((len(data), 3)), progress_of(data))
 
     def __bool__(self) -> bool:
         return bool(self.moved.any())
@@ -213,7 +213,7 @@ def _turned(
     return turned
 
 
-def _progress(data: Measurements) -> Floats:
+def progress_of(data: Measurements) -> Floats:
     """When each row was measured, from 0 for the first of its set-up to 1 for the last, (n,).
 
     Files come in the order in which they first appear, rows in that of their numbers; where these do not tell

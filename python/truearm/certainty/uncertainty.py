@@ -13,13 +13,14 @@ from truearm.certainty.threes import in_threes
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.fits.core_set import core_set
 from truearm.fits.endpoints import Endpoint
-from truearm.fits.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
+from truearm.fits.enough_values import frame_unknowns, setup_unknowns
 from truearm.fits.fitting import (
     KnownHyper,
     Task,
     feature_values,
     field_options,
 )
+from truearm.fits.identified import FRAME_UNKNOWNS
 from truearm.fits.measured_parts import MeasuredParts
 from truearm.fits.models import CONSTANT
 from truearm.fits.parameters import are_lengths

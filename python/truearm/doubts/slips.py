@@ -24,8 +24,8 @@ from truearm.doubts.at_once import (
 from truearm.doubts.row_order import FOLLOWED, poses_change, poses_of, share_explained
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
-from truearm.fits.enough_values import FRAME_UNKNOWNS
 from truearm.fits.fitted_rows import ODDS_OF_CHANCE, FittedRows
+from truearm.fits.identified import FRAME_UNKNOWNS
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -201,7 +201,6 @@ def slips_of(sessions: Sequence[Session]) -> list[Slip]:
 def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Iterator[Session]:
     """Those of a calibration's set-ups."""
     group, width = fitted.data.group[seen.rows], seen.left.shape[1]
-    frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS
     pull, alone = seen.root.T @ seen.left.ravel(), seen.precision
     metric = alone - seen.root.T @ seen.taken @ seen.root
     for name in found.groups:
@@ -214,7 +213,7 @@ def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Itera
         by_readings = seen.joints[own] @ found.robot.coupling
         setup, joints = (each.reshape(count, -1) for each in (seen.setup[own], by_readings))
         points = np.ones(count, dtype=np.bool_)
-        by = Derivatives(setup, joints, points, frame, found.selection.targets)
+        by = Derivatives(setup, joints, points, found.arm.frame_unknowns, found.selection.targets)
         yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
 
 

@@ -8,7 +8,6 @@ from truearm.calibration import Calibration
 from truearm.doubts.at_once import TARGET, TARGET_SLIPPED, Shape, Step
 from truearm.doubts.slips import Session, Slip, sessions_of, slips_of
 from truearm.doubts.whitened import Whitened
-from truearm.fits.enough_values import FRAME_UNKNOWNS
 from truearm.fits.fitted_rows import FittedRows
 from truearm.types import AXES, Floats
 
@@ -21,7 +20,7 @@ def tool_slips(found: Calibration, fitted: FittedRows, progress: Floats) -> list
     what they leave of a pose, which poses in no order scatter.
     """
     targets = len(found.selection.targets)
-    frame = 0 if found.arm.world_is_known else FRAME_UNKNOWNS
+    frame = found.arm.frame_unknowns
     seen = Whitened.of(found, fitted, progress)
     if seen is None:
         return []

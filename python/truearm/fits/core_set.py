@@ -1,7 +1,7 @@
 """What of the measurements is used, and its arrays as the core reads them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -78,13 +78,18 @@ def select_fitted(
 ) -> tuple[Selection, list[Notice]]:
     """What to use of `data` where a calibration has to know it from its fit.
 
-    Orientations that took no part are left out, unless they are asked for.
+    Targets and orientations that took no part are left out beside those that did, unless they are asked for.
 
     Raises:
         UsageError: If orientations are asked for that took no part.
         InputError: If only some rows hold distances.
     """
     selection = select(data, use, judge_target)
+    known = tuple(target for target in selection.targets if target in fitted.targets)
+    if use is None and 0 < len(known) < len(selection.targets):
+        turned = fitted.orientation and bool(data.oriented.any())
+        left_out = [target for target in selection.targets if target not in known]
+        return replace(selection, targets=known, orientation=turned), [_left_out(left_out)]
     if not selection.orientation or fitted.orientation:
         return selection, []
     if use is not None:
@@ -96,6 +101,12 @@ def select_fitted(
         )
     text = "Orientations are left out: they took no part in the calibration, which does not know them."
     return select(data, "position", judge_target), [Notice("orientations_left_out", text)]
+
+
+def _left_out(targets: Sequence[int]) -> Notice:
+    """That targets, from 0, are left out which took no part in a calibration."""
+    named = ", ".join(f"target {target + 1}" for target in targets)
+    return Notice("targets_left_out", f"Not used: {named}, which took no part in the calibration.")
 
 
 def first_measured(data: Measurements, selection: Selection) -> Rows:

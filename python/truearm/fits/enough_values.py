@@ -18,7 +18,6 @@ from truearm.rows.visits import pose_count, pose_numbers
 if TYPE_CHECKING:
     from truearm.fits.fitting import Task
 
-FRAME_UNKNOWNS: Final = 6
 POSES_PER_ROW: Final = 20
 ANY_TARGET_M: Final = 0.3
 """How many poses are drawn for each row, and how far from the flange targets lie, to count unknowns."""
@@ -106,7 +105,7 @@ def measured_values(task: "Task", data: Measurements) -> int:
 
 def frame_unknowns(task: "Task") -> int:
     """Unknowns of the frame of one set-up: none where it is known, or only distances were measured."""
-    return 0 if task.arm.world_is_known or task.selection.distances else FRAME_UNKNOWNS
+    return 0 if task.selection.distances else task.arm.frame_unknowns
 
 
 def setup_unknowns(task: "Task") -> int:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from truearm.robot import Robot
 from truearm.types import Floats
 
 Frame = Literal["free", "world"]
+
+FRAME_UNKNOWNS: Final = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,11 @@ class IdentifiedArm:
     def world_is_known(self) -> bool:
         """Whether there is no world_from_base."""
         return self.frame == "world"
+
+    @property
+    def frame_unknowns(self) -> int:
+        """Unknowns of the world_from_base of a set-up."""
+        return 0 if self.world_is_known else FRAME_UNKNOWNS
 
     @property
     def joints(self) -> list[str]:

@@ -15,8 +15,8 @@ class KnownScale:
 
     Attributes:
         freedom: Degrees of freedom that the scale of standard deviations is known from.
-        sigma_m: What half of the rows state as their sigma, or less, m; zero where none does, None in files
-            of earlier versions that do not tell.
+        sigma_m: What half of the rows state as their sigma, or less, m; zero where more of them state none,
+            None in files of earlier versions that do not tell.
         common: Share of the variance that constants leave of positions which all targets of a pose have in
             common: it is the flange that is off.
         widened: Factor on the standard deviations of an update. The noise of a robust loss is a median, which
@@ -34,9 +34,13 @@ class KnownScale:
         cls, residual: Floats, rank: int, stated: Floats | None, common: float, widened: float = 1.0
     ) -> "KnownScale":
         """Internal: that of residuals, zero where not measured, `rank` unknowns and stated sigmas (n,), m."""
-        told = np.empty(0) if stated is None else stated[np.isfinite(stated)]
-        usual = float(np.median(told)) if len(told) else 0.0
+        usual = 0.0 if stated is None else usual_sigma(np.nan_to_num(stated))
         return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)
+
+
+def usual_sigma(stated_m: Floats) -> float:
+    """What half of the rows state as their sigma (n,), m, or less; zero counts for those that state none."""
+    return float(np.quantile(stated_m, 0.5, method="lower"))
 
 
 def common_share(residual: Floats, weight: Floats, targets: int, noise_m: float, stated_m: Floats) -> float:

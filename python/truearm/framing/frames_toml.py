@@ -18,8 +18,8 @@ from truearm.programs.environment import Frame
 from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, WORLDS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
 from truearm.strictly import strictly
-from truearm.types import Floats
-from truearm.units import MM_PER_METRE
+from truearm.types import AXES, Floats
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 PLACEMENT: Final = ("xyz", *ORIENTATIONS)
 FORMAT: Final = 1
@@ -173,13 +173,14 @@ def _placement(transform: Floats, unit_m: float) -> dict[str, Any]:
 
 def _identified(found: IdentifiedFrame, data_hash: str, outer: str) -> dict[str, Any]:
     """How well a frame is known; `outer` is what an object is told in."""
+    units = np.repeat([MM_PER_METRE, MRAD_PER_RAD], AXES)
     return {
         "how": found.how,
         "residual_mm": float(np.sqrt(np.square(found.distances_mm).mean())),
         "largest_mm": float(found.distances_mm.max()),
         "std_mm": found.std_mm.tolist(),
         "std_mrad": found.std_mrad.tolist(),
-        "covariance": (found.covariance * 1e6).tolist(),
+        "covariance": (found.covariance * np.outer(units, units)).tolist(),
         "covariance_of": "x, y, z in mm and rotation vector in mrad, along the axes of "
         + ("the flange" if found.kind == "tool" else f"the {outer}"),
         "calibration": data_hash,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.errors import Notice
 from truearm.rotations import quaternion_from_matrix, rigid_inverse
 from truearm.types import Floats
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Kind = Literal["tool", "object"]
 
@@ -66,7 +66,7 @@ class IdentifiedFrame:
     @property
     def std_mrad(self) -> Floats:
         """Standard deviations of the rotation vector (3,), mrad."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[3:]) * MM_PER_METRE)
+        return np.asarray(np.sqrt(np.diag(self.covariance)[3:]) * MRAD_PER_RAD)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values: mm, mrad and quaternions w x y z."""

@@ -162,7 +162,7 @@ class Validation:
         train: The same on training rows.
         coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
             model; None where there is none, or they hold nothing that was fitted.
-        left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
+        left_out: Whether each row was judged by what the other poses gave, as after an update; else the rows
             were held out of one fit.
         n_planned: How many of them were held out because they were planned to validate.
         drift: What was taken out of all measurements, those that were held out too; None where nothing was.

@@ -43,7 +43,8 @@ def _overall(facts: Facts, told: Mapping[str, Any]) -> str:
     words = verdicts[told["verdict"]].format(
         tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
-    left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
+    outliers = count_of(len(told["outliers"]), "row")
+    left = f", {outliers} of them left out as outliers," if told["outliers"] else ""
     if told["verdict"] == "field" and not facts.changed_meanwhile and (base := of_known_world(told)):
         words = f"{words} {base}"
     if untested := untested_joints(told):

@@ -25,15 +25,17 @@ from truearm.errors import (
     list_names,
 )
 from truearm.fits.core_set import Use, select_fitted
+from truearm.fits.enough_values import measured_values
 from truearm.fits.fitted_rows import known_rows
 from truearm.fits.fitting import Task
 from truearm.judgement.validation import Errors, mean_distance
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.rows.visits import one_row_a_visit
+from truearm.rows.visits import one_row_a_visit, pose_count
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.stages import Stages, no_stages
 from truearm.storage.summary import noise_mm
+from truearm.types import Rows
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.certainty import expected_mm, less_certain
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate
@@ -41,6 +43,7 @@ from truearm.updating.kept_parts import KeptParts
 from truearm.updating.meanwhile import meanwhile
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
+from truearm.updating.revisits import shots_of
 from truearm.updating.scale import known_scale, silent_rows
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
@@ -78,10 +81,10 @@ class Update:
         tools: Motions of the targets, where the calibration knows them.
         changed: The test of offsets and tool, and of the base of a known world.
         rest: The test of what is left.
-        before: Errors of the old calibration at each pose, its frame found from the others.
-        after: The same with offsets and tool found from the others too.
-        n_poses: Poses that were used, outliers among them.
-        outliers: Data rows that were left out.
+        before: Errors of the old calibration in each row, its frame found from the other poses.
+        after: The same with offsets and tool found from the other poses too.
+        n_poses: Poses that were used, outliers among them, each once however often it was visited.
+        outliers: Data rows that were left out, of a visit all its shots.
         notices: What the user should know.
         expected_mm: Where the old calibration holds, its expected standard deviation over the poses that it
             was learned from, and that of the updated one, of what frame and target, found anew, do not take
@@ -205,9 +208,9 @@ def update(
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     data, notices = admitted(data, calibration.robot)
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
-    data = one_row_a_visit(data)
-    task, left_out = _task(calibration, data, chosen, stages)
-    data, unused = some_poses(data, task.selection)
+    given, merged = data, one_row_a_visit(data)
+    task, left_out = _task(calibration, merged, chosen, stages)
+    data, unused = some_poses(merged, task.selection)
     if unused:
         task, left_out = _task(calibration, data, chosen, stages)
     notices += [*unused, *silent_rows(calibration, data), *left_out]
@@ -227,7 +230,9 @@ def update(
         rows, outliers = _without_outliers(calibration, rows)
         _check_groups(rows.scene.data, task)
         found = _Found(calibration, rows, chosen, held)
-        return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
+        shots = shots_of(data.select(outliers), merged, given)
+        told = (*notices, *_outlier_notices(given, shots))
+        return found.told(pose_count(data), given.rows[shots].tolist(), told)
 
 
 def slipped_meanwhile(calibration: Calibration, data: Measurements, use: Use | None = None) -> list[Slip]:
@@ -266,6 +271,14 @@ class _Rows:
         scene, start = begun(whole)
         return cls(scene, start, Scatter(scene.covariance(start)))
 
+    @property
+    def visit_by_visit(self) -> "_Rows":
+        """The same, with visits to a pose that vouch for one another as poses do."""
+        scene = self.scene.visit_by_visit
+        return (
+            self if scene is self.scene else _Rows(scene, self.start, Scatter(scene.covariance(self.start)))
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _Found:
@@ -276,8 +289,8 @@ class _Found:
     options: UpdateOptions
     held: dict[int, str]
 
-    def told(self, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
-        """What the measurements say."""
+    def told(self, poses: int, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
+        """What the measurements say, from so many poses; `outliers` are the rows that do not count."""
         scene, start, scatter = self.rows.scene, self.rows.start, self.rows.scatter
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
@@ -307,7 +320,7 @@ class _Found:
             rest=rest,
             before=errors_at_left_out(scene, still, anew).statistics(),
             after=judged[self.calibration.model_name].statistics(),
-            n_poses=len(scene.data) + len(outliers),
+            n_poses=poses,
             outliers=tuple(outliers),
             notices=notices,
         )
@@ -402,15 +415,13 @@ def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, option
 
 
 def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
-    scene_values = 3 * int(data.seen(task.selection.targets).sum())
-    if task.selection.orientation:
-        scene_values += 3 * int(data.oriented.sum())
-    wanted = int(unknowns.free.sum())
-    if scene_values > wanted:
+    values, wanted = measured_values(task, data), int(unknowns.free.sum())
+    if values > wanted:
         return
-    per_pose = max(scene_values // max(len(data), 1), 1)
+    count = pose_count(data)
+    per_pose = max(values // max(count, 1), 1)
     raise TooFewError(
-        f"{scene_values} measured values in {count_of(len(data), 'pose')} cannot tell {wanted} unknowns of "
+        f"{values} measured values in {count_of(count, 'pose')} cannot tell {wanted} unknowns of "
         "offsets, frame and tool",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
@@ -421,10 +432,10 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 
 def _check_groups(data: Measurements, task: Task) -> None:
     """Each pose is judged by the others: they have to find its frame and target."""
-    fewest = FOUND_FROM + -(-len(data) // MOST_PARTS)
+    fewest = FOUND_FROM + -(-pose_count(data) // MOST_PARTS)
     seen = data.seen(task.selection.targets).any(axis=1)
     for group in task.groups:
-        count = int((seen & (data.group == group)).sum())
+        count = pose_count(data.select(seen & (data.group == group)))
         if count < fewest:
             raise TooFewError(
                 f"{count_of(count, 'pose')} of set-up {list_names([group])}",
@@ -444,7 +455,8 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
     kept, out = np.arange(len(whole.data)), list[int]()
     most = int(MOST_OUTLIERS * len(whole.data))
     while True:
-        found = estimate(rows.scene, rows.scatter, rows.start, free)
+        judged = rows.visit_by_visit
+        found = estimate(judged.scene, judged.scatter, judged.start, free)
         alone = unsupported(found, std, free, most + 1 - len(out))
         if not alone:
             return rows, out
@@ -455,8 +467,8 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
         rows = _Rows.of(Scene(whole.task, whole.data.select(kept), calibration, whole.unknowns))
 
 
-def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
-    if not outliers:
+def _outlier_notices(data: Measurements, outliers: Rows) -> list[Notice]:
+    if not len(outliers):
         return []
     which = np.isin(np.arange(len(data)), outliers)
     text = f"No other pose supports what was measured in {data.row_names(which)}: left out."

@@ -47,7 +47,8 @@ def begun(scene: Scene) -> tuple[Scene, State]:
     for that: they make up for the offsets that moved.
 
     Returns:
-        The same rows with what is found anew held there, ever so gently; and the state.
+        The same rows with what is found anew held there, ever so gently, and visits to a pose as far apart as
+        they are seen to be; and the state.
     """
     state = scene.first()
     noise = Scatter(scene.scatter(state))
@@ -55,7 +56,7 @@ def begun(scene: Scene) -> tuple[Scene, State]:
         state, step = _stepped(scene, noise, state, scene.unknowns.free)
         if step < NEAR:
             break
-    return scene.about(state.setup), state
+    return scene.begun(state), state
 
 
 def estimate(scene: Scene, scatter: Scatter, state: State, free: Mask) -> Estimate:
@@ -137,7 +138,7 @@ class _Least:
 
 
 def left_out(found: Estimate, std: Floats, free: Mask) -> Floats:
-    """Residuals (R,) of each pose's values when the free unknowns are found from the others."""
+    """Residuals (R,) of each pose's values when the free unknowns are found from the other poses."""
     linear = found.linear
     left = np.empty_like(linear.residual)
     for poses, step in folds(found, std, free):

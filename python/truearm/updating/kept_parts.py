@@ -114,23 +114,23 @@ class KeptParts:
         """The same of what became of errors: what is kept is off by what it was off before."""
         among = self._with_arm(len(errors.own))
         tied = self._among @ errors.tied
-        old = self.calibration.selection
+        old, arm = self.calibration.selection, self.calibration.arm
+        frame = arm.frame_unknowns
         width = errors.tied.shape[1] // len(self.calibration.groups)
         for k, number in self._kept.items():
             unmeasured = Selection(self._old_targets, self._old_turn)
-            here = places_of(self.calibration.arm, unmeasured, self.selection)[self._frame :]
-            there = places_of(self.calibration.arm, unmeasured, old)[self._frame :]
+            here, there = (places_of(arm, unmeasured, fitted)[frame:] for fitted in (self.selection, old))
             tied[k * self._width + here, number * width + there] = 1.0
         own = np.asarray(among @ errors.own @ among.T)
         return replace(errors, response=among @ errors.response, own=own, tied=tied)
 
     def rows(self, data: Measurements, residual: Floats) -> tuple[Measurements, Floats]:
         """Rows with columns for all that takes part, and their residuals (n, m), zero where not measured."""
-        used, whole = self.scene.task.selection, self.selection
+        used, whole, arm = self.scene.task.selection, self.selection, self.calibration.arm
         missing = max(whole.targets) + 1 - data.targets.shape[1]
         empty = np.full((len(data), max(missing, 0), AXES), np.nan)
         found = np.zeros((len(data), AXES * (len(whole.targets) + whole.orientation)))
-        places = places_of(self.calibration.arm, used, whole)[self._frame :] - self._frame
+        places = places_of(arm, used, whole)[arm.frame_unknowns :] - arm.frame_unknowns
         found[:, places] = residual
         return replace(data, targets=np.concatenate([data.targets, empty], axis=1)), found
 
@@ -156,12 +156,6 @@ class KeptParts:
             and groups[k] not in self.moved
             and not (unknowns.tool & unknowns.anew)[unknowns.group(k)].any()
         }
-
-    @property
-    def _frame(self) -> int:
-        """Unknowns of a frame."""
-        nothing = Selection(())
-        return len(places_of(self.calibration.arm, nothing, nothing))
 
     @property
     def _width(self) -> int:

@@ -3,13 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from truearm.doubts.at_once import BESIDE, Left
 from truearm.doubts.slips import Derivatives, Session, Slip, slips_of
-from truearm.drifting import Drift
-from truearm.fits.enough_values import FRAME_UNKNOWNS
-from truearm.types import Floats
+from truearm.drifting import progress_of
+from truearm.types import Floats, Rows
 from truearm.updating.estimating import Estimate, unexplained
 from truearm.updating.scene import Scene
 
@@ -26,31 +24,31 @@ def _sessions(scene: Scene, found: Estimate) -> Iterator[Session]:
     pull, noise = metric @ residual, scene.scatter(found.state)
     freedom = float(len(residual) - unknowns.free.sum())
     is_point = np.broadcast_to(~scene.orientation, scene.seen.shape)[scene.seen]
-    progress, frame = Drift.none(scene.data).progress, 0 if task.arm.world_is_known else FRAME_UNKNOWNS
+    progress = progress_of(scene.data)
     for number in range(len(task.groups)):
-        values = np.flatnonzero(scene.number[linear.pose] == number)
-        values = values[np.argsort(progress[linear.pose[values]], kind="stable")]
-        rows, first = np.unique(progress[linear.pose[values]], return_index=True)
+        values = np.flatnonzero(scene.number[linear.visit] == number)
+        values = values[np.argsort(progress[linear.visit[values]], kind="stable")]
+        rows, first = np.unique(progress[linear.visit[values]], return_index=True)
         if len(rows) < 2 * BESIDE:
             continue
-        own, visit = np.ix_(values, values), np.searchsorted(rows, progress[linear.pose[values]])
-        alone = _of_each(noise[own], visit)
+        own, visit = np.ix_(values, values), np.searchsorted(rows, progress[linear.visit[values]])
+        alone = _of_each(noise[own], linear.pose[values])
         left = Left(pull[values], metric[own], alone, visit, float(residual @ pull), freedom)
         by = Derivatives(
             linear.jacobian[values][:, unknowns.group(number)],
             linear.jacobian[values, : task.arm.robot.joint_count],
             is_point[values],
-            frame,
+            task.arm.frame_unknowns,
             task.selection.targets,
         )
         several = len(task.groups) > 1
-        yield Session(task.arm.robot, scene.data, linear.pose[values[first]], left, by, several)
+        yield Session(task.arm.robot, scene.data, linear.visit[values[first]], left, by, several)
 
 
-def _of_each(noise: Floats, visit: NDArray[np.int64]) -> Floats:
-    """Inverse of a covariance (n, n) of which each visit's values are by themselves."""
+def _of_each(noise: Floats, pose: Rows) -> Floats:
+    """Inverse of a covariance (n, n) of which each pose's values are by themselves."""
     inverse = np.zeros_like(noise)
-    for number in range(visit[-1] + 1):
-        own = np.ix_(visit == number, visit == number)
+    for number in np.unique(pose):
+        own = np.ix_(pose == number, pose == number)
         inverse[own] = np.linalg.inv(noise[own])
     return inverse

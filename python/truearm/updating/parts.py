@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.fits.core_set import Selection
-from truearm.fits.enough_values import FRAME_UNKNOWNS
 from truearm.fits.identified import IdentifiedArm
 
 
@@ -18,7 +17,7 @@ def part_of(setup: Setup, used: Selection, fitted: Selection) -> Setup:
 
 def places_of(arm: IdentifiedArm, used: Selection, fitted: Selection) -> NDArray[np.int64]:
     """Where the unknowns (W,) of a set-up that are used stand among those that were fitted."""
-    first = 0 if arm.world_is_known else FRAME_UNKNOWNS
+    first = arm.frame_unknowns
     points = [first + 3 * fitted.targets.index(target) + axis for target in used.targets for axis in range(3)]
     behind = first + 3 * len(fitted.targets)
     turn = range(behind, behind + 3 * used.orientation)

@@ -28,7 +28,7 @@ def known_scale(calibration: Calibration) -> KnownScale:
 
 
 def usual_sigma_m(calibration: Calibration) -> float:
-    """What half of the calibration's rows state as their sigma, or less, m; zero where none is known."""
+    """What half of the calibration's rows state as their sigma, or less, m; zero where that is not known."""
     return known_scale(calibration).sigma_m or 0.0
 
 

@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
@@ -13,13 +12,16 @@ from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import FINEST, noises_of, task_of
 from truearm.description.dh_row import row_transform
 from truearm.fits.core_set import core_set, rotations
-from truearm.fits.enough_values import FRAME_UNKNOWNS, setup_unknowns
+from truearm.fits.enough_values import setup_unknowns
 from truearm.fits.fitting import Task, core_errors, fit_options
+from truearm.fits.known_scale import usual_sigma
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
-from truearm.types import Floats, Mask
+from truearm.rows.visits import pose_numbers
+from truearm.types import Floats, Mask, Rows
 from truearm.updating.parts import part_of, places_of
+from truearm.updating.revisits import UNSEEN, Apart
 from truearm.updating.scale import known_scale, sigmas_m
 from truearm.updating.unknowns import Unknowns, is_part_of
 
@@ -43,13 +45,18 @@ class Linear:
         residual: Measured minus predicted (R,), m and rad.
         jacobian: Derivatives (R, u) of the prediction by the unknowns.
         departure: How far the unknowns are from where their priors have them (u,).
-        pose: Pose of each value (R,).
+        visit: Row of each value (R,), a visit to a pose.
+        pose: Number of its pose (R,).
+        quantity: Number of what it is a measurement of (R,): of visits to a pose the same, unless they
+            contradict the calibration.
     """
 
     residual: Floats
     jacobian: Floats
     departure: Floats
-    pose: NDArray[np.int64]
+    visit: Rows
+    pose: Rows
+    quantity: Rows
 
 
 class Scene:
@@ -61,6 +68,7 @@ class Scene:
         calibration: As it was.
         unknowns: What may have moved.
         about: Set-ups that what is found anew is held at, ever so gently; without them those of `found_free`.
+        apart: How far visits to a pose differ.
     """
 
     def __init__(
@@ -70,10 +78,12 @@ class Scene:
         calibration: Calibration,
         unknowns: Unknowns,
         about: Setup | None = None,
+        apart: Apart = UNSEEN,
     ) -> None:
         model = calibration.model
         self._calibration, self._about = calibration, about
-        self.task, self.data, self.unknowns = task, data, unknowns
+        self.task, self.data, self.unknowns, self.apart = task, data, unknowns, apart
+        self.poses = pose_numbers(data.readings, data.group)
         self._known, self._row_of_base = model.setup, model.constants[0]
         if is_part_of(task.selection, calibration.selection):
             self._known = part_of(model.setup, task.selection, calibration.selection)
@@ -90,9 +100,34 @@ class Scene:
         setup = self._with_known(self.found_free, self.unknowns.anew)
         return State(np.zeros(len(self.unknowns.arm_names)), setup)
 
-    def about(self, setup: Setup) -> "Scene":
-        """The same rows, with what is found anew held at other set-ups."""
-        return Scene(self.task, self.data, self._calibration, self.unknowns, setup)
+    def about(self, setup: Setup | None, apart: Apart) -> "Scene":
+        """The same rows, with what is found anew held at other set-ups, and visits so far apart."""
+        return Scene(self.task, self.data, self._calibration, self.unknowns, setup, apart)
+
+    def begun(self, state: State) -> "Scene":
+        """The same rows, with what is found anew held where it is in a state, and visits to a pose as far
+        apart as it leaves them.
+        """
+        _, residual = linearise(self.problem, self._moved_parameters(state), state.setup)
+        noise, stated, finest = (np.diagonal(each, axis1=-2, axis2=-1) for each in self._noise(state))
+        variances = np.maximum(noise, finest), stated + finest
+        apart = Apart.of(residual, self.seen, self.poses, variances, self.orientation)
+        if apart.part >= 1.0 and any(apart.seen):
+            expected = np.full(self.seen.shape, np.nan)
+            expected[self.seen] = np.diagonal(self.covariance(state))
+            apart = apart.limited(expected, self.orientation)
+        return self.about(state.setup, apart)
+
+    @property
+    def visit_by_visit(self) -> "Scene":
+        """The same rows, with visits to a pose that vouch for one another as poses do."""
+        apart = self.apart.without_common
+        return self if apart == self.apart else self.about(self._about, apart)
+
+    @property
+    def pose_count(self) -> int:
+        """How many poses the rows are visits to."""
+        return len(np.unique(self.poses))
 
     @cached_property
     def found_free(self) -> Setup:
@@ -121,8 +156,13 @@ class Scene:
         arm, residual = linearise(self.problem, parameters, state.setup)
         jacobian = np.concatenate([arm @ unknowns.directions, self._setup_jacobian(state)], axis=2)
         seen = self.seen
-        pose = np.repeat(np.arange(len(residual)), residual.shape[1]).reshape(residual.shape)
-        return Linear(residual[seen], jacobian[seen], self.departure(state), pose[seen])
+        visit, part = np.nonzero(seen)
+        pose = np.arange(len(seen)) if self.apart.contradict else self.poses
+        _, quantity = np.unique(pose[visit] * seen.shape[1] + part, return_inverse=True)
+        departure = self.departure(state)
+        return Linear(
+            residual[seen], jacobian[seen], departure, visit, self.poses[visit], quantity.reshape(-1)
+        )
 
     def departure(self, state: State) -> Floats:
         """How far the unknowns (u,) of a state are from where their priors have them.
@@ -146,7 +186,7 @@ class Scene:
         if known is None:
             return None, None
         moved = self._between(self._known, known, state.setup, number)
-        frame = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
+        frame = self.task.arm.frame_unknowns
         return (moved[:frame] if frame else None), moved[frame:]
 
     def base_motion(self, change: Floats) -> Floats:
@@ -170,25 +210,35 @@ class Scene:
     def scatter(self, state: State) -> Floats:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
 
+        What no constants explain, or a joint does not repeat, is partly the pose's: its visits share it.
+        """
+        noise, stated, finest = self._noise(state)
+        seen = self.seen.reshape(-1)
+        whole = block_diag(*(self.apart.noise(noise, stated, self.orientation) + finest))
+        whole += self.apart.in_common(noise, self.poses)
+        return np.asarray(whole[np.ix_(seen, seen)])
+
+    def _noise(self, state: State) -> tuple[Floats, Floats, Floats]:
+        """Covariances (n, m, m) of what each row shows anew, the noise and what it states beyond that, and
+        the least (m, m) there is.
+
         Noise of computed rows is next to nothing; that they are off by less than FINEST tells of no arm.
         """
         noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
-        seen = self.seen.reshape(-1)
-        own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
+        stated = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
         finest = FINEST**2 * np.eye(len(self.orientation))
-        whole = block_diag(*(self._widened**2 * (noise + own) + finest))
-        return np.asarray(whole[np.ix_(seen, seen)])
+        return self._widened**2 * noise, self._widened**2 * stated, finest
 
     def _stated_beyond_noise(self) -> Floats:
         """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.
 
-        It does where the calibration's own rows stated none: then the larger of both counts. What constants
-        alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of the
-        calibration were, whose noise is what they left beyond their own.
+        It does where most of the calibration's own rows stated none: then the larger of both counts. What
+        constants alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of
+        the calibration were, whose noise is what they left beyond their own.
         """
         stated, details = sigmas_m(self._calibration, self.data) ** 2, self._calibration.variable
         learned = self._calibration.learned_from
-        if details is None or learned is None or learned.data.sigma_m is not None:
+        if details is None or learned is None or usual_sigma(learned.data.stated_sigma_m) > 0.0:
             return stated
         noise, _ = noises_of(details.hyper)
         return np.maximum(stated - (details.inflation * noise) ** 2, 0.0)

@@ -57,7 +57,11 @@ def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresT
 
 
 def rest_test(estimated: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
-    """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave."""
+    """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave.
+
+    What visits to a pose differ by, which says how far they scatter, is no part of it, unless that is more
+    than calibration and noise leave.
+    """
     residual, free = _whitened(estimated, unknowns, unknowns.free)
     out = _basis(free, NEGLIGIBLE)
     return SquaresTest.of(residual - out @ (out.T @ residual), len(residual) - out.shape[1], known)
@@ -74,10 +78,16 @@ def wald(change: Floats, covariance: Floats, known: int) -> SquaresTest:
 
 
 def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Floats, Floats]:
-    """Residuals (R,) and columns of the chosen unknowns (R, k) in standard deviations, of both."""
-    columns = estimate.linear.jacobian[:, chosen] * unknowns.std[chosen]
-    both = np.column_stack([estimate.linear.residual, columns])
-    whitened = estimate.scatter.whitened(both)
+    """Residuals (r,) and columns of the chosen unknowns (r, k) in standard deviations, of both: of all visits
+    to a pose as of one, which is their mean.
+    """
+    linear = estimate.linear
+    columns = linear.jacobian[:, chosen] * unknowns.std[chosen]
+    whitened = estimate.scatter.whitened(np.column_stack([linear.residual, columns]))
+    count = int(linear.quantity.max()) + 1
+    if count < len(linear.residual):
+        alike = np.equal.outer(linear.quantity, np.arange(count)).astype(np.float64)
+        whitened = np.linalg.qr(estimate.scatter.whitened(alike))[0].T @ whitened
     return whitened[:, 0], whitened[:, 1:]
 
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.fits.core_set import Selection
-from truearm.fits.enough_values import FRAME_UNKNOWNS
 from truearm.fits.fitting import Task
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts
@@ -33,6 +32,7 @@ class Unknowns:
         directions: Derivatives (5 L, a) of the chain's parameters by the a unknowns of the arm.
         arm_names: Their names: joint1 ..., then base_theta ... .
         std: Prior standard deviations (u,), m and rad; zero for what is kept.
+        anew: Which are found anew (u,): they are not compared, and say nothing about what changed.
         frame: Which are of frames (u,).
         tool: Which are of targets and their orientation (u,).
         known: For each set-up of the update the number of the calibration's it may be compared with, or None.
@@ -41,6 +41,7 @@ class Unknowns:
     directions: Floats
     arm_names: tuple[str, ...]
     std: Floats
+    anew: Mask
     frame: Mask
     tool: Mask
     known: tuple[int | None, ...]
@@ -56,13 +57,15 @@ class Unknowns:
         groups = [setup_std(arm, task.selection, options, known=number is not None) for number in known]
         std = np.concatenate([[arm_std(arm, name, options) for name in names], *groups])
         frame = np.zeros(len(std), dtype=np.bool_)
+        unlike = frame.copy()
         width = len(groups[0])
-        for k in range(len(groups)):
+        for k, number in enumerate(known):
             first = len(names) + k * width
-            frame[first : first + (0 if arm.world_is_known else FRAME_UNKNOWNS)] = True
+            frame[first : first + arm.frame_unknowns] = True
+            unlike[first : first + width] = options.new_tool or number is None
         tool = ~frame
         tool[: len(names)] = False
-        return cls(directions, names, std, frame, tool, known)
+        return cls(directions, names, std, (frame | unlike) & (std > 0.0), frame, tool, known)
 
     @property
     def arm(self) -> Mask:
@@ -73,11 +76,6 @@ class Unknowns:
     def free(self) -> Mask:
         """Which are estimated (u,)."""
         return np.asarray(self.std > 0.0)
-
-    @property
-    def anew(self) -> Mask:
-        """Which are found anew (u,): they are not compared, and say nothing about what changed."""
-        return np.asarray(self.std >= OPEN)
 
     @property
     def base(self) -> Mask:
@@ -189,7 +187,7 @@ def setup_std(arm: IdentifiedArm, selection: Selection, options: UpdateOptions, 
         options: What may have moved.
         known: Whether the calibration knows the set-up's tool.
     """
-    frame = np.full(0 if arm.world_is_known else FRAME_UNKNOWNS, 0.0 if options.keep_frame else OPEN)
+    frame = np.full(arm.frame_unknowns, 0.0 if options.keep_frame else OPEN)
     points = np.full(3 * len(selection.targets), to_si(options.tool_mm, "mm"))
     turn = np.full(3 if selection.orientation else 0, to_si(options.tool_deg, "deg"))
     tool = np.concatenate([points, turn])

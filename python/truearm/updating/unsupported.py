@@ -1,4 +1,4 @@
-"""Poses of an update that no other supports: what was measured there is too unlikely given all the others."""
+"""Visits to poses that no other supports: what was measured there is too unlikely given all the others."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -14,13 +14,13 @@ LINEAR: Final = 1e-3
 
 
 def unsupported(found: Estimate, std: Floats, free: Mask, most: int) -> list[int]:
-    """Poses of an estimate that no other supports, the worst one first, each judged without those before it.
+    """Visits of an estimate that no other supports, the worst one first, each judged without those before it.
 
     Args:
-        found: Of all poses.
+        found: Of all visits.
         std: Prior standard deviations of the unknowns (u,), m and rad.
         free: Which of them were estimated (u,).
-        most: Poses that are looked for.
+        most: Visits that are looked for.
 
     Returns:
         No more than `most`, and none after those without which the estimate moves so far that it has to be
@@ -28,56 +28,56 @@ def unsupported(found: Estimate, std: Floats, free: Mask, most: int) -> list[int
     """
     left, out = _Left.of(found, std, free), list[int]()
     while len(out) < most and np.abs(left.moved).max() < LINEAR:
-        pose, score = left.worst()
+        visit, score = left.worst()
         if score <= 1.0:
             break
-        out.append(pose)
-        left = left.without(pose)
+        out.append(visit)
+        left = left.without(visit)
     return out
 
 
 @dataclass(frozen=True, eq=False)
 class _Left:
-    """R values of the poses that are left, linearised at the estimate of all poses.
+    """R values of the visits that are left, linearised at the estimate of all visits.
 
     Attributes:
         residual: Without what the unknowns explain (R,).
         metric: Inverse covariance (R, R) of these.
         gain: What the unknowns become by them (u, R).
-        pose: Of each value (R,).
-        bound: What the squares of a pose may sum up to, at each number of a pose.
+        visit: Of each value (R,).
+        bound: What the squares of a visit may sum up to, at each number of a visit.
         moved: How far the estimate of what is left is from that of all (u,).
     """
 
     residual: Floats
     metric: Floats
     gain: Floats
-    pose: Integers
+    visit: Integers
     bound: Floats
     moved: Floats
 
     @classmethod
     def of(cls, found: Estimate, std: Floats, free: Mask) -> "_Left":
-        """All poses."""
+        """All visits."""
         linear = found.linear
         metric, residual = unexplained(found, std, free)
         gain = found.covariance @ linear.jacobian.T @ found.scatter.precision
-        bound = overwhelming(np.bincount(linear.pose))
-        return cls(residual, metric, gain, linear.pose, bound, np.zeros(len(gain)))
+        bound = overwhelming(np.bincount(linear.visit))
+        return cls(residual, metric, gain, linear.visit, bound, np.zeros(len(gain)))
 
     def worst(self) -> tuple[int, float]:
-        """The pose that is the most unlikely given all others, and how many times what is allowed for."""
-        poses, squares = surprise(self.metric, self.residual, self.pose)
-        score = squares / self.bound[poses]
+        """The visit that is the most unlikely given all others, and how many times what is allowed for."""
+        visits, squares = surprise(self.metric, self.residual, self.visit)
+        score = squares / self.bound[visits]
         worst = int(np.argmax(score))
-        return int(poses[worst]), float(score[worst])
+        return int(visits[worst]), float(score[worst])
 
-    def without(self, pose: int) -> "_Left":
-        """What is left without a pose.
+    def without(self, visit: int) -> "_Left":
+        """What is left without a visit.
 
         With P the inverse of a covariance, that of the values other than o is `P - P_o^T P_oo^-1 P_o`.
         """
-        out = self.pose == pose
+        out = self.visit == visit
         kept = ~out
         pull = self.metric[out]
         taken = np.linalg.solve(pull[:, out], np.column_stack([pull[:, kept], pull @ self.residual]))
@@ -86,29 +86,29 @@ class _Left:
             residual=self.residual[kept],
             metric=self.metric[np.ix_(kept, kept)] - pull[:, kept].T @ taken[:, :-1],
             gain=gain - own @ taken[:, :-1],
-            pose=self.pose[kept],
+            visit=self.visit[kept],
             bound=self.bound,
             moved=self.moved - own @ taken[:, -1],
         )
 
 
-def surprise(metric: Floats, residual: Floats, pose: Integers) -> tuple[Integers, Floats]:
-    """How unlikely each pose is given all others.
+def surprise(metric: Floats, residual: Floats, visit: Integers) -> tuple[Integers, Floats]:
+    """How unlikely each visit is given all others.
 
     Args:
         metric: Inverse covariance (R, R) of the residuals.
         residual: (R,).
-        pose: Of each value (R,), ascending.
+        visit: Of each value (R,), ascending.
 
     Returns:
-        Poses (n,), and of each the squared standardised length (n,) of what the others do not predict.
+        Visits (n,), and of each the squared standardised length (n,) of what the others do not predict.
     """
     pull = metric @ residual
-    poses, first, counts = np.unique(pose, return_index=True, return_counts=True)
-    squares = np.empty(len(poses))
+    visits, first, counts = np.unique(visit, return_index=True, return_counts=True)
+    squares = np.empty(len(visits))
     for count in np.unique(counts):
         which = counts == count
         own = first[which, None] + np.arange(count)
         blocks, pulls = metric[own[:, :, None], own[:, None, :]], pull[own]
         squares[which] = (pulls * np.linalg.solve(blocks, pulls[:, :, None])[:, :, 0]).sum(axis=1)
-    return poses, squares
+    return visits, squares

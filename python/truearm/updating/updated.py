@@ -68,9 +68,9 @@ def updated(
         constant=_constant(calibration, scene, errors),
         validation=Validation(
             n_train=len(scene.data),
-            n_train_poses=len(scene.data),
+            n_train_poses=scene.pose_count,
             n_holdout=len(scene.data),
-            n_holdout_poses=len(scene.data),
+            n_holdout_poses=scene.pose_count,
             holdout={name: errors.statistics() for name, errors in judged.items()},
             train={name: errors.statistics() for name, errors in fitted.items()},
             left_out=True,

@@ -19,11 +19,11 @@ TURN: Final = 3
 
 
 def left_out_errors(calibration: Calibration, scene: Scene, found: Estimate) -> dict[str, RowErrors]:
-    """Errors of all models at each pose of an update, none of which had a part in what they were found from.
+    """Errors of all models in each row of an update, whose pose had no part in what they were found from.
 
     Args:
         calibration: As it was.
-        scene: The measurements, n poses.
+        scene: The measurements, n rows.
         found: Values of the unknowns from all poses.
     """
     own = errors_at_left_out(scene, found, scene.unknowns.free)
@@ -48,13 +48,14 @@ def _others(name: str, model: ArmModel, scene: Scene, found: Estimate) -> RowErr
     task, data, unknowns = scene.task, scene.data, scene.unknowns
     position = np.full((len(data), TURN), np.nan)
     turned = np.full((len(data), TURN), np.nan)
-    for out, step in folds(found, unknowns.std, unknowns.free):
+    for poses, step in folds(found, unknowns.std, unknowns.free):
+        out = np.isin(scene.poses, poses)
         change = np.zeros(len(unknowns.arm_names))
         if name != NOMINAL:
             change = found.state.arm + step[: len(change)]
         constants = model.constants + (unknowns.directions @ change).reshape(-1, 5)
         shifted = ArmModel(np.ascontiguousarray(constants), model.setup, model.field, model.scheme)
-        rest, judged = (data.select(rows) for rows in (np.setdiff1d(np.arange(len(data)), out), out))
+        rest, judged = (data.select(rows) for rows in (~out, out))
         setup = setup_of(shifted, scene, rest)
         at = shifted.parameters(model_inputs(task.arm, judged, task.options.features))
         missed = row_errors(task.arm, judged, task.selection, task.groups, at, setup)
