@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from truearm._core import Chain
+from truearm._core import Clearance as Gaps
 from truearm.cell import ur_packets
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.clearance import TOOL_MARGIN_M, Clearance
@@ -198,6 +199,31 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
     assert meeting < 0.0
     assert clearance.meets(stretched[0], beside, np.eye(4)) is None
     assert clearance.meets(stretched[0], through, np.eye(4)) == meeting
+
+
+def test_a_tool_whose_line_goes_through_the_edge_of_the_plate_meets_it():
+    """Its ends are beside the plate and above it; the least of many points on it is the line's."""
+
+    def tool(count):
+        begin, end = np.array([-0.05, 0.1, -0.02]), np.array([0.04, 0.1, 0.005])
+        return [chain(begin + share * (end - begin)) for share in np.linspace(0.0, 1.0, count)]
+
+    def chain(point):
+        frame = np.eye(4)
+        frame[:3, 3] = point
+        return Chain("standard", ["revolute"], np.zeros((1, 5)), np.eye(4), frame)
+
+    def gap(points):
+        plate = (0.0, 0.0, 0.0), np.eye(3).tolist(), (0.2, 0.2), 0.02
+        gaps = Gaps([chain([0.0, 0.0, 1.0])], points, ((5.0, 5.0, 5.0), (0.0, 0.0, -1.0), 0.01), plate)
+        return gaps.gaps(np.zeros((1, 1)), np.zeros((1, 3)), np.eye(4))[0, 1]
+
+    points = [gap([point]) for point in tool(2000)]
+    assert points[0] > 0.0
+    assert points[-1] > 0.0
+    assert gap(tool(2)) == pytest.approx(min(points), abs=2e-5)
+    assert gap(tool(2)) == pytest.approx(gap(tool(7)), abs=1e-12)
+    assert gap(tool(2)) < -5e-3
 
 
 def test_a_margin_is_that_of_the_nearest_places_on_both_ways():

@@ -33,6 +33,20 @@ def off(robot, scale=1e-3):
     return replace(robot, table=table)
 
 
+def test_authors_whose_tables_mean_something_else_are_not_taken_for_one_another(irb):
+    other = replace(ABB, convention="modified")
+    asked = ta.Compensator(irb, limits=WIDE)
+    asked.joints(np.deg2rad(TAUGHT_DEG), author=ABB)
+    found, wanted = (
+        one.joints(np.deg2rad(TAUGHT_DEG), author=other) for one in (asked, ta.Compensator(irb, limits=WIDE))
+    )
+    assert [one.code for one in wanted.refusals] == [2, 2]
+    assert found.refusals == wanted.refusals
+    sliding = replace(ABB, joints=("prismatic", *ABB.joints[1:]))
+    with pytest.raises(ta.InputError, match="has joints"):
+        asked.joints(np.deg2rad(TAUGHT_DEG), author=sliding)
+
+
 @pytest.mark.parametrize("controller", ["nominal", Controller.nominal(ABB)])
 def test_a_nominal_controller_is_the_catalogues_whoever_the_author(irb, controller, tmp_path):
     """So are the postures of configuration data: the author's wrist axes need not meet."""

@@ -150,8 +150,9 @@ class Inverse:
 class Clearance:
     """Gaps between an arm's links and tool and what a table carries, m; negative where they meet.
 
-    Links are capsules between the ends of their chains, the column is one too; of the tool, the points given
-    stay out of the plate. Rows are joint values (J,) of the arm, places (3,) of the carriage.
+    Links are capsules between the ends of their chains, the column is one too; of the tool, the lines
+    between its points stay out of the plate. Rows are joint values (J,) of the arm, places (3,) of the
+    carriage.
 
     Raises:
         CoreError: A shape does not fit, there is no row, a number is not finite, a step is not above 0.
@@ -168,7 +169,7 @@ class Clearance:
 
         Args:
             links: Base to the end of each link that has a length.
-            tool: Base to each point of the tool.
+            tool: Base to each point that the tool goes straight between.
             column: Its begin, seen from the carriage, and the way to its end (3,); its radius and a link's
                 together.
             plate: Corner of the panel (3,), seen from the carriage; unit vectors of rows, of columns and out
@@ -673,9 +674,6 @@ class Corrector:
     @staticmethod
     def usual() -> dict[str, float]:
         """The bounds of `options` where nothing is stated, but for those of joints."""
-
-    def with_tool(self, tool: NDArray[np.float64]) -> Corrector:
-        """The same for another flange_from_tool (4, 4)."""
 
     def path(
         self, readings: NDArray[np.float64], features: Sequence[float], threads: int | None = None

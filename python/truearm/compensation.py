@@ -141,7 +141,7 @@ class Compensator:
         self._features = feature_values(calibration, features)
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
-        self._correctors: OrderedDict[tuple[bytes, ...], Corrector] = OrderedDict()
+        self._correctors: OrderedDict[tuple[bytes | str, ...], Corrector] = OrderedDict()
         self._keeping = Lock()
 
     @property
@@ -257,15 +257,14 @@ class Compensator:
 
     def _corrector(self, flange_from_tool: Floats, author: Robot | None = None) -> Corrector:
         """The corrector of a tool, for an author's arm; all threads keep the same last TOOLS_KEPT."""
-        shape = () if author is None else (author.base, author.flange, author.table, author.coupling)
-        key = tuple(part.tobytes() for part in (flange_from_tool, *shape))
+        if author is not None:
+            self._check_joints(author)
+        key = (flange_from_tool.tobytes(), *(() if author is None else _kinematics(author)))
         with self._keeping:
             kept = self._correctors.get(key)
             if kept is not None:
                 self._correctors.move_to_end(key)
                 return kept
-        if author is not None:
-            self._check_joints(author)
         programming = self._programming if author is None else plain_model(author)
         tool = np.ascontiguousarray(flange_from_tool)
         made = Corrector(self._calibrated, programming, tool, self._options)
@@ -293,6 +292,12 @@ class Compensator:
             unsolved.get(place) or Refusal(place + 1, reason, code) for place, code, reason in refused
         )
         return Compensated(q, rows, residual, turned, shift, turn, std, tuple(refusals))
+
+
+def _kinematics(arm: Robot) -> tuple[bytes | str, ...]:
+    """What tells where an arm with given kinds of joints goes, for comparison with another's."""
+    numbers = arm.base, arm.flange, arm.table, arm.coupling
+    return arm.convention, *(part.tobytes() for part in numbers)
 
 
 def _compensator(

@@ -32,7 +32,7 @@ pub struct Axis {
 pub type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
 
 /// Cells that a value excites, and how much; grades add up to one where the axis covers the value.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Active {
     /// Cell of each grade.
     pub cell: [u32; MOST_ACTIVE],
@@ -133,7 +133,7 @@ impl Axis {
     #[inline]
     pub fn active(&self, value: f64) -> Active {
         let (first, grades) = self.unbounded(value);
-        let mut active = Active::default();
+        let mut active = Active::NONE;
         for (k, grade) in grades.into_iter().enumerate() {
             let cell = first + k as i64;
             if self.closed {
@@ -193,7 +193,7 @@ impl Grid {
     pub fn visit(&self, values: &[f64], mut visit: impl FnMut(usize, f64)) {
         let active: [Active; 3] = std::array::from_fn(|k| match self.axes.get(k) {
             Some(axis) => axis.active(values[self.inputs[k]]),
-            None => Active { grade: [1.0, 0.0, 0.0, 0.0], ..Active::default() },
+            None => Active { grade: [1.0, 0.0, 0.0, 0.0], ..Active::NONE },
         });
         let count = |k: usize| self.axes.get(k).map_or(1, |axis| axis.count);
         for (cell_0, grade_0) in active[0].nonzero() {

@@ -66,10 +66,9 @@ impl Conservative {
         if let Some(leverage) = &parts.leverage {
             leverage.check_inputs(parts.tables.input_count)?;
         }
-        let weights = parts.tables.blocks.iter().flat_map(|block| &block.weights);
-        let others = parts.level.iter().chain(&parts.largest).chain(&parts.centre);
-        if !weights.chain(others).all(|value| value.is_finite()) {
-            return Err(BankError::NotFinite { what: "tables of the standard deviation" });
+        let mut values = parts.level.iter().chain(&parts.largest).chain(&parts.centre);
+        if !values.all(|value| value.is_finite()) {
+            return Err(BankError::NotFinite { what: "bounds of the standard deviation" });
         }
         let compiled = parts.tables.compiled();
         Ok(Self { parts, compiled })

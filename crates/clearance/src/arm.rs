@@ -10,7 +10,7 @@ use crate::way::Way;
 pub struct Place {
     /// Ends of the links that have a length, the base first.
     pub links: Vec<[f64; 3]>,
-    /// Points of the tool.
+    /// Points that the tool goes straight between, the flange first.
     pub tool: Vec<[f64; 3]>,
 }
 

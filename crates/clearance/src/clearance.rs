@@ -45,7 +45,9 @@ impl Clearance {
     /// The least gaps with the arm and the carriage at their places.
     pub fn gaps(&self, arm: &Place, carriage: [f64; 3]) -> Gaps {
         let links = arm.links.windows(2).map(|link| self.column.gap([link[0], link[1]], carriage));
-        let tool = arm.tool.iter().map(|&point| self.plate.gap(point, carriage));
+        // A last line without length, so that a tool of one point counts.
+        let ends = arm.tool.iter().skip(1).chain(arm.tool.last());
+        let tool = arm.tool.iter().zip(ends).map(|(&from, &to)| self.plate.gap([from, to], carriage));
         Gaps { links: links.fold(f64::INFINITY, f64::min), tool: tool.fold(f64::INFINITY, f64::min) }
     }
 

@@ -35,11 +35,32 @@ pub struct Plate {
 }
 
 impl Plate {
-    /// From a point to the plate of a carriage at a place; negative below its face.
-    pub fn gap(&self, point: [f64; 3], carriage: [f64; 3]) -> f64 {
+    /// From a line to the plate of a carriage at a place; negative where it goes below its face.
+    ///
+    /// The greatest of distances that change evenly along the line is least at an end, or where two of them are equal.
+    pub fn gap(&self, line: [[f64; 3]; 2], carriage: [f64; 3]) -> f64 {
+        let [begin, end] = line.map(|point| self.off(point, carriage));
+        let at = |share: f64| {
+            let off = begin.iter().zip(&end).map(|(a, b)| a + share * (b - a));
+            off.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let mut least = at(0.0).min(at(1.0));
+        for i in 0..begin.len() {
+            for j in 0..i {
+                let (before, behind) = (begin[i] - begin[j], end[i] - end[j]);
+                if before * behind < 0.0 {
+                    least = least.min(at(before / (before - behind)));
+                }
+            }
+        }
+        least
+    }
+
+    /// How far a point is off each of the planes between which the plate lies: its face, and two edges each way.
+    fn off(&self, point: [f64; 3], carriage: [f64; 3]) -> [f64; 5] {
         let from_corner = minus(point, plus(carriage, self.corner));
         let [u, v, above] = self.axes.map(|axis| dot(axis, from_corner));
-        let beside = |at: f64, size: f64| (-self.rim - at).max(at - size - self.rim);
-        above.max(beside(u, self.area[0])).max(beside(v, self.area[1]))
+        let [rows, columns] = self.area;
+        [above, -self.rim - u, u - rows - self.rim, -self.rim - v, v - columns - self.rim]
     }
 }

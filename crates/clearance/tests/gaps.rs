@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, reason = "a test may stop")]
 
 use proptest::prelude::*;
-use truearm_clearance::{Arm, Clearance, ClearanceError, Column, Gaps, Plate, Way, distance};
+use truearm_clearance::{Arm, Clearance, ClearanceError, Column, Gaps, Place, Plate, Way, distance};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 const PARTS: usize = 200;
@@ -34,6 +34,15 @@ proptest! {
         let (found, most) = (distance(begin, along, top, down), searched(begin, along, top, down));
         // Half a part of each segment at the most lies between the nearest points and those searched.
         prop_assert!(found <= most + 1e-12 && most - found < 0.5 * 1.8 / PARTS as f64);
+    }
+
+    #[test]
+    fn the_line_of_a_tool_is_as_near_as_its_nearest_point(begin in vector(0.3), end in vector(0.3)) {
+        let gap = |tool: Vec<[f64; 3]>| clearance().gaps(&Place { links: Vec::new(), tool }, [0.0; 3]).tool;
+        let point = |k: usize| [0, 1, 2].map(|i| begin[i] + k as f64 / PARTS as f64 * (end[i] - begin[i]));
+        let most = (0..=PARTS).map(|k| gap(vec![point(k)])).fold(f64::INFINITY, f64::min);
+        let found = gap(vec![begin, end]);
+        prop_assert!(found <= most + 1e-12 && most - found < 0.6 / PARTS as f64);
     }
 
     #[test]

@@ -11,7 +11,8 @@ use crate::model::Model;
 use crate::newton::{Search, toward};
 use crate::plan::{Left, Plan};
 use crate::refusal::{Reason, Refusal};
-use crate::task::{Task, axis_turn, shift, turn};
+use crate::task::{Task, shift};
+use crate::turn::{axis_turn, turn};
 
 /// Steps at most: two or three do for a model that is smooth over the correction, a field takes one or two more.
 const STEPS: usize = 8;
@@ -117,19 +118,6 @@ impl Corrector {
         Ok(Corrector { calibrated, programming, options, plan })
     }
 
-    /// The same for another tool.
-    ///
-    /// # Errors
-    /// [`CompensateError::Kinematics`] if it is no rigid motion.
-    pub fn with_tool(&self, flange_from_tool: &Transform) -> Result<Corrector, CompensateError> {
-        let aimed = |old: &Aimed| Aimed::new(Arc::clone(&old.model), flange_from_tool);
-        Ok(Corrector {
-            calibrated: aimed(&self.calibrated)?,
-            programming: aimed(&self.programming)?,
-            ..self.clone()
-        })
-    }
-
     /// Number of joints, N.
     pub fn joint_count(&self) -> usize {
         self.calibrated.chain.joint_count()
@@ -184,10 +172,9 @@ impl Corrector {
     ) -> Option<Transform> {
         self.enter(readings, features, workspace)?;
         let frame = dispatch(Predict { corrector: self, workspace });
-        let (rotation, translation) =
-            (frame.rotation.map(|lane| lane.0[0]), frame.position.map(|lane| lane.0[0]));
-        let finite = rotation.iter().chain(&translation).all(|value| value.is_finite());
-        finite.then_some(Transform { rotation, translation })
+        let pose = frame.pose(0);
+        let finite = pose.rotation.iter().chain(&pose.translation).all(|value| value.is_finite());
+        finite.then_some(pose)
     }
 
     /// Puts one waypoint into all lanes, if it can be used.

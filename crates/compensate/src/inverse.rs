@@ -1,5 +1,6 @@
 //! Readings for poses: inverse kinematics of any model, plain or calibrated, from a seed.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, LaneFrame, Transform, dispatch, lane_room, load_lanes};
@@ -25,6 +26,8 @@ const POSES_PER_TASK: usize = 256;
 const MATRIX: usize = 16;
 /// Numbers told of each pose: residual in m and rad.
 const RESIDUALS: usize = 2;
+/// Two ways round count as equally far where they differ by less, rad.
+const EQUALLY_FAR: f64 = 1e-6;
 /// Determinant of a six-joint Jacobian in metres below which it is singular and has no sign.
 const SINGULAR: f64 = 1e-6;
 
@@ -93,7 +96,7 @@ impl Inverse {
                 out: Solved { readings, residuals },
             })
             .collect();
-        let work = |workspace: &mut Workspace, piece| dispatch(Work { inverse: self, workspace, piece });
+        let work = |workspace: &mut Workspace, piece| self.solve(piece, workspace);
         let refused = run.each(pieces, || self.workspace(features), work)?;
         let numbered = refused.into_iter().enumerate();
         Ok(numbered
@@ -123,7 +126,7 @@ impl Inverse {
         for (place, (poses, (readings, residuals))) in poses.chunks_exact(MATRIX).zip(places).enumerate() {
             run.cancel.check()?;
             let piece = Piece { poses, seeds: &last, out: Solved { readings, residuals } };
-            let found = dispatch(Work { inverse: self, workspace: &mut workspace, piece });
+            let found = self.solve(piece, &mut workspace);
             if let Some((_, refusal)) = found.first() {
                 refused.push((place, *refusal));
             } else {
@@ -136,6 +139,41 @@ impl Inverse {
     /// Number of joints, N.
     pub fn joint_count(&self) -> usize {
         self.aimed.chain.joint_count()
+    }
+
+    /// Solves a piece; what a joint's limit is in the way of once more the other way round, if that is no farther.
+    fn solve(&self, piece: Piece<'_>, workspace: &mut Workspace) -> Vec<(usize, Refusal)> {
+        let Piece { poses, seeds, out: Solved { readings, residuals } } = piece;
+        let count = self.joint_count();
+        let all =
+            Piece { poses, seeds, out: Solved { readings: &mut *readings, residuals: &mut *residuals } };
+        let mut refused = dispatch(Work { inverse: self, workspace, piece: all });
+        refused.retain(|(place, refusal)| {
+            let Some(seed) = self.other_way(refusal, &seeds[place * count..][..count]) else { return true };
+            let poses = &poses[place * MATRIX..][..MATRIX];
+            let readings = &mut readings[place * count..][..count];
+            let residuals = &mut residuals[place * RESIDUALS..][..RESIDUALS];
+            let one = Piece { poses, seeds: &seed, out: Solved { readings, residuals } };
+            !dispatch(Work { inverse: self, workspace, piece: one }).is_empty()
+        });
+        refused
+    }
+
+    /// A seed on the other side of half a turn of a joint that the first search led out of its limits.
+    fn other_way(&self, refusal: &Refusal, seed: &[f64]) -> Option<Vec<f64>> {
+        if refusal.reason != Reason::JointLimit || refusal.slides {
+            return None;
+        }
+        let joint = refusal.joint - 1;
+        let way = refusal.value - seed[joint];
+        let back = way - TAU.copysign(way);
+        let [low, high] = self.limits.joints[joint];
+        let fits = back.abs() <= way.abs() + EQUALLY_FAR && (low..=high).contains(&(seed[joint] + back));
+        fits.then(|| {
+            let mut other = seed.to_vec();
+            other[joint] += back;
+            other
+        })
     }
 
     fn check(&self, poses: &[f64], features: &[f64], out: &Solved<'_>) -> Result<(), CompensateError> {

@@ -26,6 +26,7 @@ mod refusal;
 mod spread;
 mod stream;
 mod task;
+mod turn;
 
 pub use corrector::{Correction, Corrector, Options, Workspace};
 pub use error::CompensateError;

@@ -3,7 +3,8 @@
 //! Each step is the smallest change of the joints that removes the error, J^T (J J^T)^-1 e. Where that is longer than a
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
-//! which the arm moves well nearly undamped. A step that makes the error larger is halved.
+//! which the arm moves well nearly undamped. A step that makes the error larger is halved. Errors are shifts and rotation
+//! vectors: however large they are, -J^T e is the slope of |e|^2 / 2, and no target is so far that steps lead away from it.
 //!
 //! How a step bends off its straight line is known from the screws of the joints, [`truearm_kinematics::bend`]: taken off
 //! the error before that is solved again, it makes a step exact but for the third order (Chebyshev's method), and a

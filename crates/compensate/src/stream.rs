@@ -170,7 +170,8 @@ impl Stream {
     ///
     /// `readings` (N) are the set-point, or None where none came in time, and `features` (F); `elapsed` (s) is the time since
     /// the step before: one that is negative or no finite number counts as late, and as long as the last good one. `out` (N) is
-    /// always finite, but not written before the first finite set-point.
+    /// always finite, but not written before the first finite set-point; with one of another length nothing becomes of the
+    /// set-point, which is told as not finite.
     pub fn step(
         &mut self,
         readings: Option<&[f64]>,
@@ -178,13 +179,15 @@ impl Stream {
         elapsed: f64,
         out: &mut [f64],
     ) -> Step {
+        if out.len() != self.joints.len() {
+            return Step { phase: Phase::Off, gain: self.gain, lag: 0.0, fault: Some(Fault::NotFinite) };
+        }
         let good = elapsed.is_finite() && (0.0..=self.options.deadline).contains(&elapsed);
         let late = self.started && !good;
         let elapsed = self.since(elapsed);
         let fault = self.take(readings, features, late);
-        if !self.started || out.len() != self.joints.len() {
-            let fault = Some(if self.started { Fault::NotFinite } else { Fault::NotStarted });
-            return Step { phase: Phase::Off, gain: self.gain, lag: 0.0, fault };
+        if !self.started {
+            return Step { phase: Phase::Off, gain: self.gain, lag: 0.0, fault: Some(Fault::NotStarted) };
         }
         let phase = self.ramp(fault.is_some(), elapsed);
         let share = self.gain * self.gain * (3.0 - 2.0 * self.gain);

@@ -2,6 +2,8 @@
 
 use truearm_kinematics::{Bent, Isa, Lane, LaneFrame, Screw, lane_cross};
 
+use crate::turn::{axis_turn, turn};
+
 /// What the corrected joints bring the tool to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Task {
@@ -25,14 +27,9 @@ impl Task {
     }
 }
 
-/// A turn of half a turn has no direction; its error counts as so much.
-const HALF_TURN: f64 = 1e3;
-/// Of 2 (1 + cos) of a turn's angle: below it the turn is half a turn.
-const OPPOSITE: f64 = 1e-9;
-
 /// The rows of a task. Rows 0 to 2 are the position's, in the base frame.
 pub(crate) trait Goal<const M: usize> {
-    /// The target minus where the frame is; of angles twice the tangent of half of them.
+    /// From where the frame is to the target: a shift and a rotation vector.
     fn error<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; M];
 
     /// Motion of the rows by a screw.
@@ -109,45 +106,6 @@ impl Goal<3> for PositionGoal {
 pub(crate) fn shift(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
     let (p, t) = (&frame.position, &target.position);
     [t[0] - p[0], t[1] - p[1], t[2] - p[2]]
-}
-
-/// Turn from the frame to the target in the base frame: its axis times twice the tangent of half its angle, which is
-/// the rotation vector but for the third order.
-#[inline(always)]
-pub(crate) fn turn<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
-    let mut twice = [Lane::ZERO; 3];
-    let mut trace = Lane::ZERO;
-    for k in 0..3 {
-        let (from, to) = (frame.axis(k), target.axis(k));
-        trace += dot::<I>(&from, &to);
-        let part = lane_cross::<I>(&from, &to);
-        for (sum, part) in twice.iter_mut().zip(part) {
-            *sum += part;
-        }
-    }
-    let mut sine = twice;
-    for value in &mut sine {
-        *value = *value * 0.5;
-    }
-    halved(sine, trace + Lane::splat(1.0))
-}
-
-/// The same of the tool's axis alone, whatever the turn about it.
-#[inline(always)]
-pub(crate) fn axis_turn<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
-    let (axis, wanted) = (frame.axis(2), target.axis(2));
-    let cosine = dot::<I>(&axis, &wanted);
-    halved(lane_cross::<I>(&axis, &wanted), cosine * 2.0 + Lane::splat(2.0))
-}
-
-/// Axis times twice the tangent of half the angle, from axis times sine and from 2 (1 + cosine).
-#[inline(always)]
-fn halved(sine: [Lane; 3], denominator: Lane) -> [Lane; 3] {
-    let least = Lane::splat(OPPOSITE);
-    let factor = Lane::splat(4.0) / denominator.where_below(least, least, denominator);
-    let x = sine[0] * factor;
-    let opposite = denominator.where_below(least, Lane::splat(HALF_TURN), x);
-    [opposite, sine[1] * factor, sine[2] * factor]
 }
 
 #[inline(always)]

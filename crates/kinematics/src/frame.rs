@@ -28,6 +28,14 @@ impl LaneFrame {
     pub fn axis(&self, k: usize) -> [Lane; 3] {
         [self.rotation[k], self.rotation[3 + k], self.rotation[6 + k]]
     }
+
+    /// The frame of pose `i`, below [`LANES`](crate::LANES).
+    pub fn pose(&self, i: usize) -> Transform {
+        Transform {
+            rotation: self.rotation.map(|lane| lane.0[i]),
+            translation: self.position.map(|lane| lane.0[i]),
+        }
+    }
 }
 
 /// A frame that is carried along a chain.

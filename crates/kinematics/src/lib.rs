@@ -45,5 +45,5 @@ pub use parameters::{ANGLE_ARM, LaneParameters, Parameters, SharedParameters, is
 pub use rows::{lane_room, load_lanes, store_lanes};
 pub use sweep::Screw;
 pub use transform::{Transform, rotation_exp, rotation_log};
-pub use trig::sin_cos;
+pub use trig::{polynomial, sin_cos};
 pub use vector::{cross, lane_cross, norm};

@@ -62,9 +62,9 @@ fn reduced<I: Isa>(angle: Lane) -> (Lane, Lane) {
     (quadrant(shifted, s, c, 0), quadrant(shifted, c, s, 1))
 }
 
-/// By Estrin's scheme: half as many steps that wait for each other as Horner's has.
+/// Polynomials, lowest coefficient first, by Estrin's scheme: half as many steps that wait for each other as Horner's has.
 #[inline(always)]
-fn polynomial<I: Isa>(coefficients: &[f64; 7], x: Lane) -> Lane {
+pub fn polynomial<I: Isa>(coefficients: &[f64; 7], x: Lane) -> Lane {
     let c = |i: usize| Lane::splat(coefficients[i]);
     let (x2, pair) = (x * x, |i: usize| I::mul_add(c(i + 1), x, c(i)));
     let (low, high) = (I::mul_add(pair(2), x2, pair(0)), I::mul_add(c(6), x2, pair(4)));

@@ -175,11 +175,6 @@ impl Corrector {
         ])
     }
 
-    fn with_tool(&self, tool: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
-        let tool = transform("tool", &tool)?;
-        Ok(Self::wrap(self.core.with_tool(&tool).map_err(Failure::into_exception)?))
-    }
-
     /// Corrected readings (n, N), numbers (n, 5), refusals.
     #[pyo3(signature = (readings, features, threads=None))]
     fn path<'py>(

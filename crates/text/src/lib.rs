@@ -14,7 +14,7 @@ pub use error::TextError;
 pub use format::write_fixed;
 pub use number::Number;
 pub use scan::{Lines, scan_lines};
-pub use splice::{Numbers, Words, splice, splice_in_pieces};
+pub use splice::{Numbers, Words, splice_in_pieces};
 pub use values::{Values, read_numbers};
 
 /// Where `word` stands in a text for the first time.

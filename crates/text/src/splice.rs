@@ -34,18 +34,11 @@ pub struct Words<'a> {
     pub bytes: &'a [u8],
 }
 
-/// `text` with numbers and words, both in the order of the text, and every other byte as it is.
+/// `text` with numbers and words, both in the order of the text, and every other byte as it is: in pieces, which
+/// follow one another.
 ///
 /// # Errors
 /// If a span does not fit the text or overlaps another one, or a value is not finite.
-pub fn splice(text: &[u8], numbers: Numbers<'_>, words: &[Words<'_>]) -> Result<Vec<u8>, TextError> {
-    Ok(splice_in_pieces(text, numbers, words)?.concat())
-}
-
-/// The same in pieces, which follow one another.
-///
-/// # Errors
-/// As for [`splice`].
 pub fn splice_in_pieces(
     text: &[u8],
     numbers: Numbers<'_>,

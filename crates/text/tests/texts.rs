@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use truearm_text::{
-    Lines, Number, Numbers, TextError, Values, Words, find, read_numbers, scan_lines, splice, write_fixed,
+    Lines, Number, Numbers, TextError, Values, Words, find, read_numbers, scan_lines, splice_in_pieces,
+    write_fixed,
 };
 
 fn fixed(value: f64, decimals: u32, plus: bool) -> String {
@@ -40,6 +41,10 @@ fn scanned(text: &[u8]) -> Result<(Lines, Vec<Number>), TextError> {
 fn found(text: &str) -> Result<Vec<(&str, f64, i16)>, TextError> {
     let (_, numbers) = scanned(text.as_bytes())?;
     Ok(numbers.iter().map(|n| (&text[n.start..n.end], n.value, n.decimals)).collect())
+}
+
+fn splice(text: &[u8], numbers: Numbers<'_>, words: &[Words<'_>]) -> Result<Vec<u8>, TextError> {
+    Ok(splice_in_pieces(text, numbers, words)?.concat())
 }
 
 #[test]

@@ -20,8 +20,8 @@ from truearm.units import to_si
 
 # How far the plate reaches beyond the effective area.
 RIM_M: Final = 0.02
-# Middle and end of the tool.
-TOOL_SHARES: Final = (0.5, 1.0)
+# Ends of the tool's line.
+TOOL_SHARES: Final = (0.0, 1.0)
 ARM_STEP_RAD: Final = 0.05
 TABLE_STEP_M: Final = 0.05
 # Less than what a panel that waits is farther from its point than the point is uncertain.

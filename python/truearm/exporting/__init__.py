@@ -14,6 +14,7 @@ from truearm.errors import UsageError, count_of, did_you_mean, list_names
 from truearm.exporting.constant_part import constant_robot
 from truearm.exporting.field_grid import grid_axes, grid_table, grid_text
 from truearm.exporting.losses import ONLY_ROS, beta_is_lost, coupling_is_lost, field_is_lost
+from truearm.exporting.new_urdf import unstated_limits
 from truearm.exporting.tables import csv_text, json_text, toml_text
 from truearm.exporting.ur_yaml import yaml_text
 from truearm.exporting.urdf_file import urdf_text
@@ -43,7 +44,8 @@ class ExportOptions:
     Attributes:
         urdf: For "urdf": the URDF to correct, "FILE.urdf#TIP"; None writes a new one.
         kinematics_hash: For "ur-yaml": the hash that the driver compares with the arm's; None makes one.
-        grid: For "field-csv": "q1=-90:90:7,q4=30", deg and mm; None for five readings a joint.
+        grid: For "field-csv": "q1=-90:90:7,q4=30", deg and mm; None for five readings of each joint
+            that moved.
         features: For "field-csv": features of the calibration by name, one number each for all samples.
         with_std: For "field-csv": whether to add standard deviations.
 
@@ -152,7 +154,7 @@ def _constants(calibration: Calibration, chosen: Format, options: ExportOptions)
     robot, nominal = constant_robot(calibration), calibration.robot
     notes, chain = field_is_lost(calibration, chosen), ""
     if chosen == "urdf":
-        notes += coupling_is_lost(robot)
+        notes += coupling_is_lost(robot) + ([] if options.urdf else unstated_limits(robot))
         text, difference, names = urdf_text(robot, nominal, options.urdf, notes)
         chain = f"{names.base_link},{names.tip_link}" if options.urdf else ""
     elif chosen == "ur-yaml":

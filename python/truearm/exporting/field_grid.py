@@ -53,14 +53,14 @@ def grid_axes(calibration: Calibration, stated: str | None = None) -> list[Axis]
         calibration: Tells how far the readings went that it was fitted to.
         stated: "q1=-90:90:7,q4=30": from, to and number of readings, or one; deg, and mm of prismatic
             joints. Where it is given, a joint that it does not name stays in the middle of its range; without
-            it each joint has five readings over its range.
+            it each joint that moved has five readings over its range.
 
     Raises:
         UsageError: If it cannot be read, names a joint twice, or leaves a joint's limits.
     """
     ranges = _ranges(calibration)
     if stated is None:
-        return [Axis(low, high, POINTS) for low, high in ranges]
+        return [Axis(low, high, 1 if low == high else POINTS) for low, high in ranges]
     axes = [Axis(0.5 * (low + high), 0.5 * (low + high), 1) for low, high in ranges]
     named = set[int]()
     for part in stated.replace(" ", "").split(","):

@@ -7,12 +7,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from truearm.description.robot_data import RobotData
+from truearm.description.urdf_limits import UNLIMITED
 from truearm.description.urdf_names import UrdfNames
+from truearm.errors import list_rows
 from truearm.exporting.losses import is_directed
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.types import Floats
 
-WITHOUT_LIMITS_M: Final = 1000.0
+UNITS: Final = {"revolute": "rad", "prismatic": "m"}
 
 
 def new_urdf(robot: RobotData, names: UrdfNames) -> ET.Element:
@@ -51,6 +53,27 @@ def default_names(robot: RobotData) -> UrdfNames:
     )
 
 
+def unstated_limits(robot: RobotData) -> list[str]:
+    """What numbers stand for that a URDF needs where a limit is open, or no calibration knows it."""
+    notes = [
+        "Limits of effort and velocity, which no calibration knows, are 0 here: put in the maker's, or "
+        "correct the maker's URDF, which keeps its own"
+    ]
+    joints = range(robot.joint_count) if is_directed(robot) else ()
+    for kind, unit in UNITS.items():
+        open_ended = [
+            j + 1
+            for j in joints
+            if _type(robot, j, directed=True) == kind and np.isinf(robot.limits[j]).any()
+        ]
+        if open_ended:
+            notes.append(
+                f"{list_rows(open_ended, 'joint').capitalize()} may go on without end one way or both, "
+                f"where a URDF needs a number: {UNLIMITED[kind]:g} {unit} stand for no limit"
+            )
+    return notes
+
+
 def set_origin(joint: ET.Element, origin: Floats) -> None:
     """Write the origin (4, 4) of a joint to its last digit."""
     element = joint.find("origin")
@@ -70,7 +93,8 @@ def _joint(name: str, kind: str, parent: str, child: str, origin: Floats) -> ET.
 
 
 def _type(robot: RobotData, j: int, *, directed: bool) -> str:
-    unlimited = not directed or not np.isfinite(robot.limits[j]).all()
+    """What a URDF calls the joint: continuous where it turns and has no limit at either end."""
+    unlimited = not directed or not np.isfinite(robot.limits[j]).any()
     return "continuous" if robot.joints[j] == "revolute" and unlimited else robot.joints[j]
 
 
@@ -78,7 +102,8 @@ def _limit(joint: ET.Element, robot: RobotData, j: int, *, directed: bool) -> No
     if joint.get("type") == "continuous":
         return
     bounds = robot.limits[j] if directed else np.array([-np.inf, np.inf])
-    lower, upper = np.clip(bounds, -WITHOUT_LIMITS_M, WITHOUT_LIMITS_M).tolist()
+    none = UNLIMITED[robot.joints[j]]
+    lower, upper = np.clip(bounds, -none, none).tolist()
     ET.SubElement(joint, "limit", lower=repr(lower), upper=repr(upper), effort="0", velocity="0")
 
 

@@ -98,7 +98,7 @@ pub unsafe fn worded(
     // SAFETY: as the caller promises; the first byte has just been written.
     unsafe {
         if status as i32 != 0 && !message.is_null() && size > 0 && message.read() == 0 {
-            tell(message, size, &status.words().to_string_lossy());
+            tell(message, size, &status.text().to_string_lossy());
         }
     }
     status

@@ -45,10 +45,51 @@ pub enum Status {
 }
 
 impl Status {
+    const ALL: [Self; 18] = [
+        Self::Ok,
+        Self::Held,
+        Self::Refused,
+        Self::BadPointer,
+        Self::WrongSize,
+        Self::NotFinite,
+        Self::BadHandle,
+        Self::Busy,
+        Self::Unreadable,
+        Self::NotACalibration,
+        Self::Altered,
+        Self::UnknownLayout,
+        Self::BadOption,
+        Self::NotStarted,
+        Self::Internal,
+        Self::OtherWorkspace,
+        Self::UnknownModel,
+        Self::BadRounding,
+    ];
+
     /// A sentence about it.
-    pub(super) fn words(self) -> &'static CStr {
-        // SAFETY: every text of this library is a literal that ends with a zero.
-        unsafe { CStr::from_ptr(truearm_status_text(self as i32)) }
+    pub(super) const fn text(self) -> &'static CStr {
+        match self {
+            Self::Ok => c"done",
+            Self::Held => c"the set-point has no correction of its own; the last one is held or ramped down",
+            Self::Refused => c"the waypoint must not be corrected: see reason",
+            Self::BadPointer => c"a pointer is null or not aligned",
+            Self::WrongSize => c"an array has another length than truearm_joint_count and truearm_feature_count say",
+            Self::NotFinite => c"a reading or a feature is NaN or infinite, or so large that the result is",
+            Self::BadHandle => c"a handle is of another kind or was freed",
+            Self::Busy => c"another thread is using this workspace or stream: give each thread its own",
+            Self::Unreadable => c"the file cannot be read",
+            Self::NotACalibration => c"the file is no calibration",
+            Self::Altered => c"the calibration is cut short, altered or contradicts itself",
+            Self::UnknownLayout => c"the calibration has a layout that this library does not know",
+            Self::BadOption => c"an option breaks its rule",
+            Self::NotStarted => c"there was no set-point yet",
+            Self::Internal => c"a mistake in this library: please report it",
+            Self::OtherWorkspace => c"the workspace was made for another corrector",
+            Self::UnknownModel => {
+                c"this library knows constant and variable models: calibrate with --model constant or variable"
+            }
+            Self::BadRounding => c"the thread does not round to nearest: call fesetround(FE_TONEAREST) before",
+        }
     }
 }
 
@@ -75,30 +116,8 @@ pub extern "C" fn truearm_version() -> *const c_char {
 /// A sentence about a status; never null.
 #[unsafe(no_mangle)]
 pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
-    let text = match status {
-        0 => c"done",
-        1 => c"the set-point has no correction of its own; the last one is held or ramped down",
-        2 => c"the waypoint must not be corrected: see reason",
-        -1 => c"a pointer is null or not aligned",
-        -2 => c"an array has another length than truearm_joint_count and truearm_feature_count say",
-        -3 => c"a reading or a feature is NaN or infinite, or so large that the result is",
-        -4 => c"a handle is of another kind or was freed",
-        -5 => c"another thread is using this workspace or stream: give each thread its own",
-        -6 => c"the file cannot be read",
-        -7 => c"the file is no calibration",
-        -8 => c"the calibration is cut short, altered or contradicts itself",
-        -9 => c"the calibration has a layout that this library does not know",
-        -10 => c"an option breaks its rule",
-        -11 => c"there was no set-point yet",
-        -12 => c"a mistake in this library: please report it",
-        -13 => c"the workspace was made for another corrector",
-        -14 => {
-            c"this library knows constant and variable models: calibrate with --model constant or variable"
-        }
-        -15 => c"the thread does not round to nearest: call fesetround(FE_TONEAREST) before",
-        _ => c"no status of this library",
-    };
-    text.as_ptr()
+    let known = Status::ALL.into_iter().find(|known| *known as i32 == status);
+    known.map_or(c"no status of this library", Status::text).as_ptr()
 }
 
 /// A sentence about the reason of a correction or of a stream's state; never null.

@@ -1,14 +1,12 @@
 //! What C passes and gets by value.
 
-use truearm_compensate::{Correction, Fault, Options, Phase, Refusal, Step, StreamOptions, Task};
+use truearm_compensate::{Correction, Fault, Options, Reason, Refusal, Step, StreamOptions, Task};
 
 use super::status::Status;
 use crate::loaded::Loaded;
 
 /// Reason of a set-point that came too late; the others are those of refusals.
 const LATE: u32 = 100;
-/// Reason of a set-point that is not finite.
-const NOT_FINITE: u32 = 1;
 
 /// What is corrected, and how far; infinity switches a bound off.
 #[derive(Debug, Clone, Copy)]
@@ -173,17 +171,10 @@ pub struct StreamState {
 impl StreamState {
     pub(super) fn of(step: &Step) -> Self {
         let reason = step.fault.map_or(0, |fault| match fault {
-            Fault::NotStarted | Fault::NotFinite => NOT_FINITE,
+            Fault::NotStarted | Fault::NotFinite => Reason::NotFinite as u32,
             Fault::Late => LATE,
             Fault::Refused(refusal) => code(&refusal),
         });
-        let phase = match step.phase {
-            Phase::Off => 0,
-            Phase::Rising => 1,
-            Phase::On => 2,
-            Phase::Holding => 3,
-            Phase::Falling => 4,
-        };
-        Self { phase, reason, gain: step.gain, lag: step.lag }
+        Self { phase: step.phase as u32, reason, gain: step.gain, lag: step.lag }
     }
 }

@@ -1,7 +1,9 @@
 //! Readings for poses, on the branch and turn of the seed.
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use crate::common::{Scene, apart, readings, six_axis, stream, tool};
+use std::f64::consts::PI;
+
+use crate::common::{Scene, apart, five_axis, readings, seven_axis, six_axis, stream, tool, unbounded};
 use truearm_compensate::{Inverse, Options, Reason, Run, Solved};
 use truearm_kinematics::Transform;
 
@@ -15,7 +17,7 @@ struct Found {
 }
 
 fn solve(inverse: &Inverse, poses: &[Transform], seeds: &[f64], along: bool) -> Found {
-    let mut out = vec![0.0; poses.len() * 6];
+    let mut out = vec![0.0; poses.len() * inverse.joint_count()];
     let mut residuals = vec![0.0; poses.len() * 2];
     let solved = Solved { readings: &mut out, residuals: &mut residuals };
     let work = if along { Inverse::follow } else { Inverse::each };
@@ -69,6 +71,24 @@ fn a_path_keeps_its_turn() {
     let found = solve(&inverse(&scene), &scene.real(&q), &start, true);
     assert_eq!(found.refused, []);
     assert!(found.readings.iter().zip(&q).all(|(a, b)| (a - b).abs() < 1e-9));
+}
+
+#[test]
+fn half_a_turn_is_no_standstill() {
+    let scene = Scene::new(seven_axis(), 1e-3);
+    let inverse = Inverse::new(scene.calibrated(), &tool(), Options::default()).unwrap();
+    for turned in [PI, PI - 1e-3, 3.0] {
+        let seeds: Vec<f64> = readings(&scene.chain, 16, 3).iter().map(|x| 0.4 * x).collect();
+        let mut goals = seeds.clone();
+        goals.iter_mut().skip(6).step_by(7).for_each(|q| *q += turned);
+        let poses = scene.real(&goals);
+        let found = solve(&inverse, &poses, &seeds, false);
+        assert_eq!(found.refused, [], "{turned} rad");
+        for (pose, real) in poses.iter().zip(scene.real(&found.readings)) {
+            let (distance, angle) = apart(pose, &real);
+            assert!(distance < 1e-8 && angle < 1e-7, "{distance} m, {angle} rad");
+        }
+    }
 }
 
 #[test]

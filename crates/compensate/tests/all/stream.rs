@@ -91,6 +91,17 @@ fn the_first_set_point_is_given_out_as_it_is() {
 }
 
 #[test]
+fn nothing_becomes_of_a_set_point_that_cannot_be_given_out() {
+    let (mut stream, mut out) = (stream(), [7.0; JOINTS]);
+    for wrong in [JOINTS - 1, JOINTS + 1] {
+        let step = stream.step(Some(&START), &[], 0.0, &mut vec![0.0; wrong]);
+        assert_eq!(step.fault, Some(Fault::NotFinite));
+        assert_eq!(stream.step(None, &[], 0.0, &mut out).fault, Some(Fault::NotStarted));
+    }
+    assert_eq!(out, [7.0; JOINTS]);
+}
+
+#[test]
 fn switched_off_it_ramps_down_to_nothing() {
     let mut stream = stream();
     let time = run(&mut stream, 0.0, 2.0);
