@@ -15,6 +15,7 @@
 extern crate self as truearm_field;
 
 mod ascent;
+mod beyond;
 pub mod cmac;
 mod columns;
 mod compass;
