@@ -69,6 +69,7 @@ pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME, Wave};
 pub use joined::shots_of_poses;
 pub use leverage_fit::fit_leverage;
+pub use linear::STILL;
 pub use options::{Begin, FieldOptions, Start};
 pub use outliers::{Judgement, QUANTILE_95};
 pub use own::UNRIPPLED;
