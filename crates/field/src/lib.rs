@@ -38,6 +38,7 @@ mod information;
 mod joined;
 mod leverage_fit;
 mod linear;
+mod mixed;
 mod model;
 mod optimise;
 mod options;

@@ -3,6 +3,7 @@
 use pyo3::PyClass;
 use pyo3::prelude::*;
 
+mod arrays;
 mod asked;
 mod blocks;
 mod chain;
