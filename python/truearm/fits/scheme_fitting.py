@@ -207,7 +207,7 @@ def _fit_on_measurements(name: str, rows: SchemeRows, options: SchemeOptions) ->
 
 def _targets(rows: SchemeRows) -> int:
     """Targets of a pose."""
-    return rows.constant.setup.targets.shape[1]
+    return int(rows.constant.setup.targets.shape[1])
 
 
 def _empty(name: str, rows: SchemeRows, options: SchemeOptions) -> Network:
