@@ -98,6 +98,60 @@ def test_a_negative_distance_is_refused():
         measured(q, targets=np.zeros((40, 0, 3)), distances=[(k, True, 0, -0.5) for k in range(40)])
 
 
+def test_poses_that_hold_nothing_are_refused():
+    with pytest.raises(CoreError, match="a target or more, or its orientation"):
+        measured(drawn(6), targets=np.zeros((6, 0, 3)))
+
+
+def test_a_distance_whose_other_end_is_left_out_takes_no_part():
+    q, weight = drawn(80), np.ones(80)
+    weight[60:] = 0.0
+    reached = CHAIN.pose(q, LINKS)[:, :3, :3] @ TARGET + CHAIN.pose(q, LINKS)[:, :3, 3]
+
+    def found(ends, off):
+        distances = [(k, False, m, np.linalg.norm(reached[k] - reached[m]) + off(m)) for k, m in ends]
+        more = {"targets": np.zeros((80, 0, 3)), "distances": distances, "weight": weight}
+        return constants(Problem(CHAIN, measured(q, **more), COLUMNS)).parameters
+
+    kept = [(k, (7 * k + 11) % 60) for k in range(60)]
+    spoilt = found(kept + [(k, 60 + k % 20) for k in range(60)], lambda m: 0.05 * (m >= 60))
+    np.testing.assert_allclose(spoilt, found(kept, lambda m: 0.0), atol=1e-12)
+
+
+def test_configurations_go_together_beyond_the_data():
+    q = 0.15 * drawn(40)
+    problem = Problem(CHAIN, measured(q), COLUMNS)
+    fitted = field(problem, 40).hyper
+    lengths = {name: [0.4] * len(found) for name, found in fitted.items() if "length" in name}
+    hyper = fitted | lengths | {"smooth": [3e-4] * 3, "own": [3e-4]}
+    posterior = field(problem, 40, hyper=hyper).posterior
+    far = q[0] + 2.0 * np.eye(6)[0]
+    near = far + 0.05 * np.eye(6)[0]
+    asked = np.array([far, far, near, q[0]])
+    rows = np.tile(np.random.default_rng(0).normal(size=(3, len(COLUMNS))), (4, 1, 1))
+    whole = posterior.joint_covariance(asked, rows).reshape(4, 3, 4, 3)
+    each = posterior.covariance(asked, rows)
+    np.testing.assert_allclose(whole[0, :, 1], each[0], rtol=1e-9)
+    np.testing.assert_allclose(whole[0, :, 0], each[0], rtol=1e-9)
+    alike = np.trace(whole[0, :, 2]) / np.trace(each[0])
+    assert 0.9 < alike < 1.0
+    np.testing.assert_allclose(
+        posterior.cross_covariance(1, asked, rows), whole[0].reshape(3, 12)[:, 3:], rtol=1e-9
+    )
+    assert np.linalg.eigvalsh(whole.reshape(12, 12)).min() > -1e-9 * np.trace(each[0])
+
+
+def test_arrays_of_another_shape_are_refused_whatever_their_length():
+    q = drawn(40)
+    posterior = field(Problem(CHAIN, measured(q), COLUMNS), 40).posterior
+    rows = np.ones((6, 3, len(COLUMNS)))
+    for shape in ((3, 12), (12, 3)):
+        with pytest.raises(CoreError, match="inputs has shape"):
+            posterior.covariance(q[:6].reshape(shape), rows)
+    with pytest.raises(CoreError, match="jacobian has shape"):
+        posterior.prior(q[:6], rows.reshape(6, len(COLUMNS), 3))
+
+
 def test_a_field_is_not_fitted_to_distances():
     q = drawn(40)
     distances = [(k, True, 0, 1.0) for k in range(40)]

@@ -105,7 +105,9 @@ class SixAxes:
         kept = np.abs(pitch) < np.deg2rad(60.0)
         return q[kept], np.column_stack([pose[:, :3, 3], roll, pitch, yaw])[kept]
 
-    def linearised(self, q: Floats) -> tuple[Floats, Floats]:
+    def linearised(self, q: Floats, points: Floats | None = None) -> tuple[Floats, Floats]:
+        """Rows of poses, or of the positions alone of `points` (T, 3) of the tool."""
+        flange = np.zeros((1, 3)) if points is None else points
         table = np.ascontiguousarray(self.arm.table)
         true = np.repeat(table[None], len(q), axis=0).reshape(len(q), -1)
         true[:, 5] += 1e-3 * np.sin(q[:, 0] + q[:, 1])
@@ -115,14 +117,14 @@ class SixAxes:
         arrays: Any = {
             "joints": q,
             "group": np.zeros(len(q), dtype=np.int64),
-            "targets": np.ascontiguousarray(pose[:, None, :3, 3]),
-            "rotations": np.ascontiguousarray(pose[:, :3, :3]),
+            "targets": pose[:, None, :3, 3] + np.einsum("nij,tj->nti", pose[:, :3, :3], flange),
+            "rotations": np.ascontiguousarray(pose[:, :3, :3]) if points is None else None,
             "sigma": np.zeros(len(q)),
             "weight": np.ones(len(q)),
             "distances": [],
         }
         problem = _core.Problem(self.chain, _core.MeasurementSet(arrays), list(self.COLUMNS), True)
-        setup = _core.Setup(np.eye(4)[None], np.zeros((1, 1, 3)), np.eye(3)[None], np.zeros((0, 3)))
+        setup = _core.Setup(np.eye(4)[None], flange[None], np.eye(3)[None], np.zeros((0, 3)))
         return _core.linearise(problem, table, setup)
 
 
@@ -149,6 +151,33 @@ def test_six_inputs_with_orientation_learn_in_a_hash_table() -> None:
     left = residual - np.einsum("nmp,np->nm", jacobian, ceps)
     before, after = np.linalg.norm(residual[:, :3], axis=1), np.linalg.norm(left[:, :3], axis=1)
     assert after.mean() < 0.3 * before.mean()
+
+
+def test_targets_count_alike_whichever_stands_first() -> None:
+    arm = SixAxes()
+    q, features = arm.poses(60, 1)
+    s = np.ascontiguousarray(features[:, :2])
+    sensors = [(low, high, 6, 3) for low, high in zip(s.min(0), s.max(0), strict=True)]
+    shape: Any = {"membership": "gaussian", "sigma": 0.5, "composition": "product", "table": None}
+    empty = _core.Network(sensors, len(arm.COLUMNS), shape)
+    points = np.array([[0.0, 0.0, 0.1], [0.08, 0.02, -0.03], [-0.05, 0.06, 0.02]])
+    noise = np.random.default_rng(0).normal(scale=3e-5, size=(len(q), 3, 3))
+    options: Any = {"columns": list(arm.COLUMNS), "targets": 3, "scales": (2e-5, 1e-4, 1e-3), "threads": 1}
+    training: Any = {"columns": options["columns"], "rate": 1.0, "normalise": "squares"}
+    training |= {"tolerance": 1e-5, "epochs": 3}
+
+    def rows(order: list[int]) -> tuple[Floats, Floats]:
+        jacobian, residual = arm.linearised(q, points[order])
+        return jacobian, residual + noise[:, order].reshape(len(q), 9)
+
+    for order in ([1, 2, 0], [2, 0, 1]):
+        outputs = [empty.fit(s, *rows(k), options).network.output(s) for k in ([0, 1, 2], order)]
+        np.testing.assert_allclose(outputs[1], outputs[0], rtol=1e-6, atol=1e-12)
+        kappa = [_core.observability(rows(k)[0], options["columns"], 3)["kappa"] for k in ([0, 1, 2], order)]
+        assert kappa[1] == pytest.approx(kappa[0])
+    assert empty.train_on_measurements(s, *rows([0, 1, 2]), training, 3).epochs == 3
+    with pytest.raises(_core.CoreError, match="three for each target"):
+        empty.fit(s, *rows([0, 1, 2]), options | {"targets": 1})
 
 
 @pytest.mark.parametrize(

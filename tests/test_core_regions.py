@@ -258,6 +258,15 @@ def test_chosen_poses_are_better_than_any_and_the_limit_is_judged() -> None:
     assert not _core.choose_poses(jacobian, 20, refused).well_conditioned
     with pytest.raises(_core.CoreError, match="criterion is 'best'"):
         _core.choose_poses(jacobian, 20, options | {"criterion": "best"})
+    for criterion in ("kappa", "d"):
+        with pytest.raises(_core.CoreError, match="Jacobians are zero"):
+            _core.choose_poses(np.zeros_like(jacobian), 20, options | {"criterion": criterion})
+
+
+def test_columns_that_do_not_ascend_are_refused() -> None:
+    arm = Arm()
+    with pytest.raises(_core.CoreError, match="ascending"):
+        _core.divide(arm.chain, COLUMNS[::-1], arm.table, arm.setup, arm, OPTIONS, MEASURING)
 
 
 def test_a_tree_survives_being_saved() -> None:

@@ -82,6 +82,21 @@ def test_one_held_out_row_is_enough_for_a_report(tmp_path, monkeypatch):
     assert "% of the held-out coordinates" not in page
 
 
+def test_readings_that_jitter_where_a_slide_stands_still_are_no_input():
+    robot = ta.Robot.load("adept-cobra-600")
+    arm, options = VirtualArm(robot, seed=0), ta.CalibrationOptions(refit=False)
+    q, elsewhere = arm.poses(25, seed=1), arm.poses(40, seed=7)
+    elsewhere[:, 2] = 0.1
+    jitter = 2e-6 * np.random.default_rng(3).normal(size=25)
+
+    def uncertain_mm(readings):
+        q[:, 2] = readings
+        calibration = ta.calibrate(robot, arm.measure(q, seed=1), options)
+        return 1e3 * np.linalg.norm(calibration.position_std(elsewhere), axis=1).mean()
+
+    assert uncertain_mm(0.05 + jitter) == pytest.approx(uncertain_mm(0.05), rel=0.2)
+
+
 def test_joints_that_stood_still_are_several():
     readings = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.ones(5)])
     told = still_warning(readings, ("revolute",) * 3)

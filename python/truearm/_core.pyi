@@ -11,6 +11,9 @@ __version__: str
 ANGLE_ARM_M: float
 """Metres that a radian counts where lengths and angles are compared."""
 
+STILL_M: float
+"""Way of a slide, m, up to which it stands still."""
+
 NORMAL_95: float
 """95 % of a standard normal variable lies within this."""
 
@@ -1066,12 +1069,14 @@ class NetworkFitOptions(TypedDict):
 
     Attributes:
         columns: As in TrainingOptions.
+        targets: Of a pose: three rows each, and behind them three of the orientation if it was measured.
         scales: Standard deviations in m (angles at 0.3 m) of the noise, of second differences of weights
             along an input, and of what has none; None to find them by maximum marginal likelihood.
         threads: At the most, or None for all.
     """
 
     columns: Sequence[int]
+    targets: int
     scales: tuple[float, float, float] | None
     threads: int | None
 
@@ -1156,6 +1161,7 @@ class Network:
         jacobian: NDArray[np.float64],
         residual: NDArray[np.float64],
         options: TrainingOptions,
+        targets: int = 1,
     ) -> Training:
         """Train by rule (A5) on rows as `linearise` gives them. Honours Ctrl-C.
 
@@ -1167,6 +1173,7 @@ class Network:
             jacobian: (n, m, P).
             residual: (n, m).
             options: As for `train`; the tolerance is that of residuals.
+            targets: As in NetworkFitOptions.
         """
 
     def fit(
@@ -1293,8 +1300,10 @@ def choose_poses(jacobian: NDArray[np.float64], count: int, options: ChoiceOptio
         CoreError: A number is out of its range, a shape does not fit, a value is not finite.
     """
 
-def observability(jacobian: NDArray[np.float64], columns: Sequence[int]) -> dict[str, float]:
-    """Indices of poses with Jacobians (n, m, P).
+def observability(
+    jacobian: NDArray[np.float64], columns: Sequence[int], targets: int = 1
+) -> dict[str, float]:
+    """Indices of poses with Jacobians (n, m, P): three rows for each target, then three of an orientation.
 
     They are of the matrix M in mm (orientations at 300 mm) per mm and 1/300 rad.
 

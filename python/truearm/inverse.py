@@ -21,7 +21,9 @@ class Inverse:
 
     Arms with an ortho-parallel base and a spherical wrist, and those with three parallel axes as Universal
     Robots has them, are solved in closed form on the plain arm nearest to the given one, and polished on the
-    given one: all their up to eight solutions are found. Other arms are solved by Newton steps from many
+    given one: all their up to eight solutions are found. A calibrated wrist whose axes do not quite meet has
+    more of them where it is nearly straight, of which a few may be lacking: they are searched for from eight
+    sides. `near` finds the one that a seed is near to. Other arms are solved by Newton steps from many
     starts, which finds all solutions as a rule but cannot promise it. An arm with more than six axes has
     infinitely many solutions: `solutions` gives a sample, `near` the one that the seed leads to. An arm with
     fewer than six takes the nearest orientation, within 2 mrad, so that the rounded numbers of a program,

@@ -300,11 +300,11 @@ impl Fit<'_> {
         let set = self.problem.measurements;
         let (mut position, mut orientation) = (Squares::default(), Squares::default());
         if set.is_distances() {
-            let counts = |distance: &Distance| set.weight[distance.pose] > 0.0;
+            let counts = |distance: &Distance| distance.weight(&set.weight) > 0.0;
             let measured = set.distances.iter().zip(residuals);
             for (distance, residual) in measured.filter(|(distance, _)| counts(distance)) {
                 let own = set.sigma[distance.pose].powi(2);
-                position.push(residual * residual, own, weights[distance.pose]);
+                position.push(residual * residual, own, distance.weight(weights));
             }
             return (position, orientation);
         }

@@ -31,6 +31,17 @@ pub struct Distance {
     pub value: f64,
 }
 
+impl Distance {
+    /// Its part of the poses' weights (n,): that of the pose where it starts; none where the pose at its other end is left
+    /// out.
+    pub fn weight(&self, weight: &[f64]) -> f64 {
+        match self.to {
+            DistanceTo::Pose(other) if weight[other] == 0.0 => 0.0,
+            _ => weight[self.pose],
+        }
+    }
+}
+
 /// Flange poses and their derivatives, enough to move the target of any pose.
 struct Arm {
     poses: Vec<f64>,
@@ -134,7 +145,7 @@ pub fn normal_equations(
     let mut normal = Normal::zeros(Layout::new(problem).len());
     for (row, distance) in rows(problem, point)?.into_iter().zip(&set.distances) {
         let weight = weighting.map_or(1.0, |(noise, weight)| {
-            row_weight(noise.position, set.sigma[distance.pose], weight[distance.pose]).sqrt()
+            row_weight(noise.position, set.sigma[distance.pose], distance.weight(weight)).sqrt()
         });
         let entries: Vec<_> = row.entries.iter().map(|&(at, value)| (at, weight * value)).collect();
         normal.add_row(&entries, weight * row.residual);

@@ -51,6 +51,12 @@ pub enum EstimateError {
         /// The first pose concerned.
         pose: usize,
     },
+    /// No choice can be made by what candidates tell.
+    #[error(
+        "the candidates' Jacobians are zero, or too large to be weighed against each other: draw poses in which more \
+         joints move, or choose them for other parameters"
+    )]
+    Untelling,
     /// A set-up is that of other measurements.
     #[error(
         "the set-up has {found} {what} where the measurements need {expected}: give the set-up of a fit to them"

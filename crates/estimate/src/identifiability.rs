@@ -19,7 +19,7 @@ use crate::dense::{Orthogonal, singular_values};
 use crate::distance;
 use crate::layout::{Layout, Problem};
 use crate::rows::{Linearised, Point, linearise};
-use crate::scale::{column_unit, scaled_matrix};
+use crate::scale::{PoseRows, column_unit, scaled_matrix};
 use crate::setup::Setup;
 
 /// A column counts as spanned when less than this share of it stands out of the others' span.
@@ -103,12 +103,13 @@ fn folded_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64
 fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised, poses: &[usize]) -> Mat<f64> {
     let set = problem.measurements;
     let (width, own) = (layout.len(), layout.len() - layout.arm);
+    let kinds = PoseRows::new(rows.rows, layout.targets);
     let mut dense = Mat::zeros(poses.len() * rows.rows, width);
     for (index, &pose) in poses.iter().enumerate().filter(|(_, pose)| set.weight[**pose] > 0.0) {
         let group = layout.group(set.group[pose]).start - layout.arm;
         for row in 0..rows.rows {
             let at = pose * rows.rows + row;
-            let unit = if row < 3 * layout.targets { 1.0 } else { ANGLE_ARM };
+            let unit = kinds.unit(row);
             let line = index * rows.rows + row;
             for k in 0..layout.arm {
                 dense[(line, own + k)] = unit * rows.arm[at * layout.arm + k] * scale(problem, layout, k);
@@ -127,7 +128,7 @@ fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<M
     let rows = distance::derivatives(problem, point)?;
     let set = problem.measurements;
     Ok(Mat::from_fn(rows.len() / width, width, |row, column| {
-        if set.weight[set.distances[row].pose] == 0.0 {
+        if set.distances[row].weight(&set.weight) == 0.0 {
             return 0.0;
         }
         let source = if column < own { layout.arm + column } else { column - own };
@@ -135,14 +136,13 @@ fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<M
     }))
 }
 
-/// Columns of a Jacobian (n, m, P) of parameters `columns`, m rows a pose, that none before them can stand for: their
-/// positions, ascending.
+/// Columns of a Jacobian (n, m, P) of parameters `columns` that none before them can stand for: their positions, ascending.
 ///
 /// # Errors
 /// [`EstimateError::Length`] where the Jacobian is empty or not of whole poses.
 pub fn independent_columns(
     jacobian: &[f64],
-    rows: usize,
+    rows: PoseRows,
     columns: &[usize],
 ) -> Result<Vec<usize>, EstimateError> {
     Ok(independent(scaled_matrix(jacobian, rows, columns)?.as_ref()))

@@ -61,9 +61,7 @@ impl Problem<'_> {
         }
         Ok(())
     }
-}
 
-impl Problem<'_> {
     /// Groups and anchors that nothing was measured in cannot be fitted; so many of them would fill the memory.
     fn check_counts(&self) -> Result<(), EstimateError> {
         let (set, refuse) = (self.measurements, |what, value, rule| {

@@ -54,6 +54,6 @@ pub use minimise::Reason;
 pub use non_negative::non_negative_least_squares;
 pub use robust::Robust;
 pub use rows::{Linearised, Point, linearise, residuals};
-pub use scale::{column_unit, row_unit, scaled_jacobian};
+pub use scale::{PoseRows, column_unit, scaled_jacobian};
 pub use setup::{FrameMode, GroupSetup, Setup};
 pub use start::initial_setup;

@@ -65,7 +65,7 @@ impl MeasurementSet {
     /// Measured values that take part: rows that are neither missing nor of weight zero.
     pub fn measured_values(&self) -> usize {
         if self.is_distances() {
-            return self.distances.iter().filter(|distance| self.weight[distance.pose] > 0.0).count();
+            return self.distances.iter().filter(|distance| distance.weight(&self.weight) > 0.0).count();
         }
         (0..self.pose_count()).map(|pose| self.measured_values_of(pose)).sum()
     }
@@ -115,6 +115,11 @@ impl MeasurementSet {
     /// is missing), [`EstimateError::Kinematics`] of a rotation that is none, and [`EstimateError::Option`].
     pub fn check(&self) -> Result<(), EstimateError> {
         let n = self.pose_count();
+        if self.rows_per_pose() == 0 && !self.is_distances() {
+            let rule =
+                "each pose has a target or more, or its orientation: give what was measured, or distances";
+            return Err(EstimateError::Option { what: "the number of values of a pose", value: 0.0, rule });
+        }
         let length = |what, found, expected| {
             if found == expected { Ok(()) } else { Err(EstimateError::Length { what, found, expected }) }
         };

@@ -105,7 +105,7 @@ impl ConservativePlan {
         self.check_within(fitted)?;
         self.check_within(fresh)?;
         let grids = self.grids();
-        let rows = Rows::new(&grids, self.kinds.len(), fitted.inputs);
+        let rows = ExcitedCells::new(&grids, self.kinds.len(), fitted.inputs);
         let mut solved = Vec::with_capacity(BOUNDED);
         let (leverage, units) = leverage(self, fitted, cancel)?;
         for k in 0..BOUNDED {
@@ -212,12 +212,12 @@ fn logs(samples: Samples, units: &[f64], k: usize) -> Vec<f64> {
 }
 
 /// Excited cells of each sample, numbered through all grids.
-struct Rows {
+struct ExcitedCells {
     cells: usize,
     entries: Vec<Vec<(usize, f64)>>,
 }
 
-impl Rows {
+impl ExcitedCells {
     fn new(grids: &[Grid], inputs: usize, values: &[f64]) -> Self {
         let row = |values: &[f64]| {
             let (mut entries, mut first) = (Vec::new(), 0);
@@ -242,7 +242,7 @@ struct Solved {
     weights: Vec<f64>,
 }
 
-fn solve(rows: &Rows, logs: &[f64]) -> Result<Solved, FieldError> {
+fn solve(rows: &ExcitedCells, logs: &[f64]) -> Result<Solved, FieldError> {
     let level = logs.iter().sum::<f64>() / logs.len() as f64;
     let mut weights = vec![0.0; rows.cells];
     let mut importance = vec![1.0; logs.len()];

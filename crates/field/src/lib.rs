@@ -15,6 +15,7 @@
 extern crate self as truearm_field;
 
 mod ascent;
+mod beyond;
 pub mod cmac;
 mod columns;
 mod compass;
@@ -37,6 +38,7 @@ mod information;
 mod joined;
 mod leverage_fit;
 mod linear;
+mod mixed;
 mod model;
 mod optimise;
 mod options;
@@ -68,6 +70,7 @@ pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME, Wave};
 pub use joined::shots_of_poses;
 pub use leverage_fit::fit_leverage;
+pub use linear::STILL;
 pub use options::{Begin, FieldOptions, Start};
 pub use outliers::{Judgement, QUANTILE_95};
 pub use own::UNRIPPLED;

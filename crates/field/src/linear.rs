@@ -103,6 +103,10 @@ fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {
     problem.columns.iter().enumerate().map(column).collect()
 }
 
+/// Ways of a slide up to this one, m, are what its readings jitter by where it stands still: as far from it as ever, nothing
+/// tells of what it does.
+pub const STILL: f64 = 5e-4;
+
 fn joint_inputs(problem: &Problem) -> Vec<Input> {
     let set = problem.measurements;
     let input = |k| {
@@ -110,7 +114,7 @@ fn joint_inputs(problem: &Problem) -> Vec<Input> {
             return Input::ANGLE;
         }
         let (low, high) = range(set.joints.iter().skip(k).step_by(set.joint_count));
-        Input::line(high - low)
+        Input::line(if high - low > STILL { high - low } else { 0.0 })
     };
     (0..problem.chain.joint_count()).map(input).collect()
 }

@@ -129,25 +129,6 @@ impl Cells {
         alike(self.geometry.joint_count(), here, there, loads);
         table.sag.iter_mut().zip(loads.iter()).for_each(|(column, load)| column[at] = *load);
     }
-
-    /// Prior variances of the blocks at one configuration, which excites these cells, cells beyond the axes included.
-    fn unbounded(&self, values: &[f64], excited: &Excited) -> PairTable {
-        let mut table = PairTable::default();
-        table.clear(self.own.len(), self.products.len(), self.waves.len(), 1);
-        for (k, (column, cells)) in table.own.iter_mut().zip(&self.own).enumerate() {
-            column[0] = cells.as_ref().map_or(0.0, |cells| cells.variance(values[k]));
-        }
-        table.smooth[0] = self.smooth.iter().zip(values).map(|(cells, &value)| cells.variance(value)).sum();
-        for (column, axes) in table.products.iter_mut().zip(&self.products) {
-            column[0] = axes.iter().map(|(k, cells)| cells.variance(values[*k])).product();
-        }
-        for (column, (k, cells)) in table.waves.iter_mut().zip(&self.waves) {
-            column[0] = cells.variance(values[*k]);
-        }
-        let levers = &excited.levers;
-        self.fill_loads((levers, levers), &mut vec![0.0; self.own.len()], &mut table, 0);
-        table
-    }
 }
 
 /// Excited cells of one configuration.
@@ -283,29 +264,18 @@ impl Model {
         self.covariances(here, std::slice::from_ref(here))
     }
 
-    /// What the cells leave out of each column's prior variance at a configuration beyond their axes, (P,).
-    ///
-    /// No row excites the cells that would be there: their share of the posterior variance is the prior's.
-    pub fn beyond(&self, values: &[f64]) -> Vec<f64> {
-        let [_, beyond] = self.held_and_beyond(values);
-        beyond
-    }
-
-    /// Each column's prior variance at a configuration, (P,): what its cells hold, and what they leave out.
-    pub fn held_and_beyond(&self, values: &[f64]) -> [Vec<f64>; 2] {
-        let excited = self.cells.excite(values);
-        let held = self.variances(&excited);
-        let whole = self.combined(&self.cells.unbounded(values, &excited), 1);
-        let beyond = whole.iter().zip(&held).map(|(all, held)| (all - held).max(0.0)).collect();
-        [held, beyond]
-    }
-
     /// Prior covariances of each column's CEP, (count, P).
     fn combined(&self, table: &PairTable, count: usize) -> Vec<f64> {
         let width = self.training.columns.len();
         let constants: Vec<f64> = (0..width).map(|p| self.constant_deviation(p).powi(2)).collect();
         let mut out = constants.repeat(count);
-        for (i, variances) in out.chunks_exact_mut(width).enumerate() {
+        self.add_varying(table, &mut out);
+        out
+    }
+
+    /// Adds what blocks have in common to covariances (count, P) of the columns' CEPs.
+    pub fn add_varying(&self, table: &PairTable, out: &mut [f64]) {
+        for (i, variances) in out.chunks_exact_mut(self.training.columns.len()).enumerate() {
             for (class, columns) in self.by_column.driven.iter().enumerate() {
                 let products = self.hyper.products.iter().zip(&table.products);
                 let products: f64 =
@@ -325,6 +295,5 @@ impl Model {
                 }
             }
         }
-        out
     }
 }

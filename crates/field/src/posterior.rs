@@ -10,6 +10,7 @@ use truearm_estimate::dense::{Cholesky, column, to_vec};
 use truearm_kinematics::Cancel;
 
 use crate::FieldError;
+use crate::beyond::Beyond;
 use crate::data_space::DataSpace;
 use crate::drives::Drives;
 use crate::hyper::Hyper;
@@ -230,8 +231,10 @@ impl Posterior {
             Self::Weight(space) => space.covariance(&query),
         };
         covariance.par_chunks_exact_mut(rows * rows).enumerate().for_each(|(pose, block)| {
-            let beyond = self.model().beyond(query.values_of(pose));
-            if beyond.iter().any(|&variance| variance > 0.0) {
+            let beyond = Beyond::new(&self.model().cells, query.values_of(pose));
+            if !beyond.is_nothing() {
+                let here = (query.values_of(pose), &beyond);
+                let beyond = self.model().beyond_between(here, here);
                 let entry = |k: usize| query.prior(pose, (k / rows, k % rows), &beyond);
                 block.iter_mut().enumerate().for_each(|(k, value)| *value += entry(k));
             }
@@ -254,15 +257,7 @@ impl Posterior {
     ) -> Result<Vec<f64>, FieldError> {
         let query = self.query(values, jacobian, setup, rows)?;
         let all = 0..query.poses();
-        let mut joint = self.joint(&query, all.clone(), all);
-        for pose in 0..query.poses() {
-            let beyond = self.model().beyond(query.values_of(pose));
-            for k in 0..rows * rows {
-                let (i, j) = (k / rows, k % rows);
-                joint[(pose * rows + i, pose * rows + j)] += query.prior(pose, (i, j), &beyond);
-            }
-        }
-        Ok(self.row_major(&joint))
+        Ok(self.row_major(&self.joint(&query, all.clone(), all)))
     }
 
     /// Covariance (k m, (n - k) m) of the rows of the first k configurations with those of the others, row-major.
@@ -286,9 +281,33 @@ impl Posterior {
     }
 
     fn joint(&self, query: &Query, left: Range<usize>, right: Range<usize>) -> Mat<f64> {
-        match self {
-            Self::Data(space) => space.joint(query, left, right),
-            Self::Weight(space) => space.joint(query, left, right),
+        let mut joint = match self {
+            Self::Data(space) => space.joint(query, left.clone(), right.clone()),
+            Self::Weight(space) => space.joint(query, left.clone(), right.clone()),
+        };
+        self.add_beyond(query, (left, right), &mut joint);
+        joint
+    }
+
+    /// Adds what configurations of a query that lie beyond the cells have in common there.
+    fn add_beyond(&self, query: &Query, (left, right): (Range<usize>, Range<usize>), joint: &mut Mat<f64>) {
+        let (model, rows) = (self.model(), query.rows);
+        let places: Vec<(&[f64], Beyond)> = (0..query.poses())
+            .map(|pose| (query.values_of(pose), Beyond::new(&model.cells, query.values_of(pose))))
+            .collect();
+        let outside = |poses: &Range<usize>| -> Vec<usize> {
+            poses.clone().filter(|&pose| !places[pose].1.is_nothing()).collect()
+        };
+        let place = |pose: usize| (places[pose].0, &places[pose].1);
+        let others = outside(&right);
+        for a in outside(&left) {
+            for &b in &others {
+                let block = query.cross((a, b), &model.beyond_between(place(a), place(b)));
+                let (first, across) = ((a - left.start) * rows, (b - right.start) * rows);
+                block.iter().enumerate().for_each(|(k, value)| {
+                    joint[(first + k / rows, across + k % rows)] += value;
+                });
+            }
         }
     }
 
@@ -339,8 +358,9 @@ impl Posterior {
         let scale = model.hyper.extrapolation.powi(2);
         let mut out = vec![0.0; query.poses() * rows];
         out.par_chunks_exact_mut(rows).enumerate().for_each(|(pose, out)| {
-            let [mut variances, beyond] = model.held_and_beyond(query.values_of(pose));
-            variances.iter_mut().zip(beyond).for_each(|(variance, more)| *variance += more);
+            let values = query.values_of(pose);
+            let mut variances = model.variances(&model.cells.excite(values));
+            variances.iter_mut().zip(model.beyond(values)).for_each(|(variance, more)| *variance += more);
             let own = (0..rows).map(|i| scale * query.prior(pose, (i, i), &variances));
             out.iter_mut().zip(own).for_each(|(out, variance)| *out = variance);
         });

@@ -36,15 +36,20 @@ pub struct Found {
     pub evaluations: usize,
 }
 
-/// The usual joints of an arm, those that the search begins with first.
-fn usual_joints(count: usize) -> impl Iterator<Item = Vec<usize>> {
-    [0..3, 1..3, 1..4].into_iter().map(move |joints| joints.filter(|&joint| joint < count).collect())
+/// The usual joints of an arm, each choice once and of [`FEWEST`] at least, those that the search begins with first.
+fn usual_joints(count: usize) -> Vec<Vec<usize>> {
+    let known = [0..3, 1..3, 1..4].into_iter();
+    let mut choices: Vec<Vec<usize>> =
+        known.map(|joints| joints.filter(|&joint| joint < count).collect()).collect();
+    choices.retain(|joints| joints.len() >= FEWEST.min(count));
+    choices.dedup();
+    choices
 }
 
 /// What is left of the evidence of `found` once its joints, and how they were chosen, are counted against it.
 fn net(found: &Found, joints: usize) -> f64 {
     let major = found.hyper.major_joints();
-    let chance = if usual_joints(joints).any(|usual| usual == major) { 0.0 } else { CHANCE };
+    let chance = if usual_joints(joints).iter().any(|usual| usual == major) { 0.0 } else { CHANCE };
     found.value - WORTH * major.len() as f64 - chance
 }
 
@@ -60,7 +65,7 @@ pub fn select_major(
     cancel: &Cancel,
 ) -> Result<Found, FieldError> {
     let evidence = Evidence::new(training, cancel);
-    let first = usual_joints(joints).next().unwrap_or_default();
+    let first = usual_joints(joints).into_iter().next().unwrap_or_default();
     let (mut begun, mut usual) = (0, None::<Found>);
     let lines = training.inputs.iter().any(|input| input.kind == InputKind::Line);
     for start in Hyper::starts(&first, joints, noise, lines) {
@@ -94,7 +99,7 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
     let present = found.hyper.clone();
     let mut best = found;
     for rival in usual_joints(joints) {
-        if rival == present.major_joints() || rival.is_empty() {
+        if rival == present.major_joints() {
             continue;
         }
         let rival = present.with_major(rival);
@@ -152,4 +157,18 @@ pub fn refine(evidence: &Evidence, start: Hyper, limits: Limits) -> Result<Found
     let informed = |logs: &[f64]| evidence.informed(&start.with_logs(logs));
     let summit = climb(informed, &start.to_logs(), &start.ranges(), limits)?;
     Ok(Found { hyper: start.with_logs(&summit.point), value: summit.value, evaluations: summit.evaluations })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_joints_are_two_at_least_and_each_choice_once() {
+        let sets = |joints: &[&[usize]]| joints.iter().map(|set| set.to_vec()).collect::<Vec<_>>();
+        assert_eq!(usual_joints(6), sets(&[&[0, 1, 2], &[1, 2], &[1, 2, 3]]));
+        assert_eq!(usual_joints(3), sets(&[&[0, 1, 2], &[1, 2]]));
+        assert_eq!(usual_joints(2), sets(&[&[0, 1]]));
+        assert_eq!(usual_joints(1), sets(&[&[0]]));
+    }
 }

@@ -4,7 +4,7 @@ use truearm_kinematics::{
     Chain, KinematicsError, Parameters, SharedParameters, Transform, norm, rotation_log,
 };
 
-use crate::vector::sub;
+use crate::vector::{Vector, sub};
 
 /// Error, m and rad, below which a start has arrived: a few hundred roundings of an arm's length.
 const ARRIVED: f64 = 1e-13;
@@ -63,6 +63,17 @@ impl Newton {
         let mut matrix = [0.0; 16];
         self.chain.poses(joints, Parameters::Prepared(&self.parameters), &mut matrix)?;
         Ok(Transform::from_matrix(&matrix))
+    }
+
+    /// Directions of the axes in the base frame at joint values (J,), all of which turn.
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
+    pub fn directions(&self, joints: &[f64]) -> Result<Vec<Vector>, KinematicsError> {
+        let count = self.chain.joint_count();
+        let mut jacobian = vec![0.0; 6 * count];
+        self.chain.joint_pose_jacobian(joints, Parameters::Prepared(&self.parameters), &mut jacobian)?;
+        Ok((0..count).map(|joint| [3, 4, 5].map(|row| jacobian[row * count + joint])).collect())
     }
 
     /// Improve `starts`, at most `steps` steps each; what is left of each.

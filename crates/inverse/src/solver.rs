@@ -1,9 +1,10 @@
 //! The solver: candidates of a closed form or of many starts, polished, told apart and brought within limits.
 
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 
 use rayon::prelude::*;
-use truearm_kinematics::{KinematicsError, Transform};
+use truearm_kinematics::{KinematicsError, Transform, cross, norm};
 
 use crate::arm::Arm;
 use crate::axes::Axes;
@@ -12,6 +13,7 @@ use crate::error::InverseError;
 use crate::newton::Newton;
 use crate::readings::Readings;
 use crate::shape::{Method, Shape};
+use crate::vector::dot;
 
 /// Steps that polish a closed form's candidate: enough from where a factory calibration puts it.
 const POLISHING: usize = 16;
@@ -28,6 +30,11 @@ const BESIDE_M: [f64; 4] = [-0.02, -0.003, 0.003, 0.02];
 /// How far beside a target the closed form is asked once more, metres: at the border of its reach, where the arm
 /// is stretched or its wrist lies on the first axis, roundings decide whether it has a branch.
 const HAIR_M: [f64; 2] = [-1e-7, 1e-7];
+/// Sine of the angle between the fourth and the sixth axis below which a wrist is nearly straight: the closed form's two
+/// ways of its turning may lead to one of the solutions that a wrist whose axes do not quite meet has there.
+const STRAIGHT: f64 = 0.05;
+/// Ways of turning a straight wrist between its first and its last axis that solutions are searched for from.
+const WAYS: usize = 8;
 /// Solutions of an arm with a closed form when none is lacking.
 const BRANCHES: usize = 8;
 
@@ -157,6 +164,10 @@ impl Inverse {
             let (at, lacking) = self.closed_form(target, &joints);
             self.collect(target, at, POLISHING, &mut found)?;
             self.collect(target, lacking, POLISHING, &mut found)?;
+            if !self.exact && self.method() == Method::SphericalWrist {
+                let turned = self.turned_wrists(&found)?;
+                self.collect(target, turned, POLISHING, &mut found)?;
+            }
             if !self.exact && found.len() < BRANCHES {
                 self.collect(target, self.around(target, &joints), POLISHING, &mut found)?;
             }
@@ -189,6 +200,26 @@ impl Inverse {
             candidates.extend(self.shape.candidates(&beside, seed).concat());
         }
         candidates
+    }
+
+    /// Those of some readings whose wrist is nearly straight, turned between its first and its last axis.
+    fn turned_wrists(&self, found: &[Vec<f64>]) -> Result<Vec<f64>, KinematicsError> {
+        let mut starts = Vec::new();
+        for readings in found {
+            let joints = self.readings.joints(readings);
+            let axes = self.newton.directions(&joints)?;
+            if norm(cross(axes[3], axes[5])) > STRAIGHT {
+                continue;
+            }
+            for way in 1..WAYS {
+                let turn = TAU * way as f64 / WAYS as f64;
+                let start = starts.len();
+                starts.extend_from_slice(&joints);
+                starts[start + 3] += turn;
+                starts[start + 5] -= turn * dot(axes[3], axes[5]).signum();
+            }
+        }
+        Ok(starts)
     }
 
     fn collect(

@@ -2,33 +2,49 @@
 
 use std::ops::Range;
 
-use numpy::{PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
 use truearm_field::Posterior;
 
-/// What a posterior is asked with, copied: Python may change its arrays meanwhile.
+use crate::arrays::{numbers, wrong_shape};
+
+/// What a posterior is asked with, copied.
 pub struct Copies {
     inputs: Vec<f64>,
     jacobian: Vec<f64>,
     setup: Option<Vec<f64>>,
+    poses: usize,
 }
 
 impl Copies {
     /// Copies of inputs (n, I), Jacobians (n, m, P) and set-up columns (n, m, s).
+    ///
+    /// # Errors
+    /// A shape is another.
     pub fn of(
+        core: &Posterior,
         inputs: &PyReadonlyArray2<f64>,
         jacobian: &PyReadonlyArray3<f64>,
         setup: Option<&PyReadonlyArray3<f64>>,
-    ) -> Self {
-        Self {
-            inputs: inputs.as_array().iter().copied().collect(),
-            jacobian: jacobian.as_array().iter().copied().collect(),
-            setup: setup.map(|array| array.as_array().iter().copied().collect()),
+    ) -> PyResult<Self> {
+        let training = core.training();
+        let (poses, rows) = (inputs.shape()[0], jacobian.shape()[1]);
+        let fits = |name, got: &[usize], wanted: &[usize]| {
+            if got == wanted { Ok(()) } else { Err(wrong_shape(name, got, wanted)) }
+        };
+        fits("inputs", inputs.shape(), &[poses, training.input_count()])?;
+        fits("jacobian", jacobian.shape(), &[poses, rows, training.column_count()])?;
+        if let Some(setup) = setup {
+            fits("setup", setup.shape(), &[poses, rows, training.setup_width])?;
         }
+        let setup = setup.map(numbers);
+        Ok(Self { inputs: numbers(inputs), jacobian: numbers(jacobian), setup, poses })
     }
 
     /// What they ask.
     pub fn asked(&self) -> Asked<'_> {
-        Asked { inputs: &self.inputs, jacobian: &self.jacobian, setup: self.setup.as_deref() }
+        let Self { inputs, jacobian, setup, poses } = self;
+        Asked { inputs, jacobian, setup: setup.as_deref(), poses: *poses }
     }
 }
 
@@ -38,22 +54,22 @@ pub struct Asked<'a> {
     pub inputs: &'a [f64],
     pub jacobian: &'a [f64],
     pub setup: Option<&'a [f64]>,
+    /// Configurations, n.
+    pub poses: usize,
 }
 
 impl<'a> Asked<'a> {
-    /// Configurations, n; one where the arrays are not of as many, so that the core sees them whole and refuses them.
-    pub fn poses(&self, core: &Posterior) -> usize {
-        let count = self.inputs.len() / core.training().input_count();
-        let even = |array: &[f64]| array.len().is_multiple_of(count) && count > 0;
-        if even(self.inputs) && even(self.jacobian) && self.setup.is_none_or(even) { count } else { 1 }
-    }
-
-    /// Some of so many configurations.
-    pub fn part(&self, part: &Range<usize>, whole: usize) -> Asked<'a> {
+    /// Some of its configurations.
+    pub fn part(&self, part: &Range<usize>) -> Asked<'a> {
         let of = |array: &'a [f64]| {
-            let each = array.len() / whole;
+            let each = array.len() / self.poses.max(1);
             &array[part.start * each..part.end * each]
         };
-        Asked { inputs: of(self.inputs), jacobian: of(self.jacobian), setup: self.setup.map(of) }
+        Asked {
+            inputs: of(self.inputs),
+            jacobian: of(self.jacobian),
+            setup: self.setup.map(of),
+            poses: part.len(),
+        }
     }
 }

@@ -12,6 +12,7 @@ use truearm_kinematics::{
     Batch, Chain as Core, Convention, Joint, KinematicsError, Link, Parameters, SharedParameters, Transform,
 };
 
+use crate::arrays::unknown;
 use crate::door::{CoreError, Failure, quick};
 
 type Rows<'py> = PyReadonlyArray2<'py, f64>;
@@ -252,8 +253,4 @@ fn link(name: &str, p: &[f64]) -> PyResult<Link> {
         }
     };
     Ok(Link { joint, theta: p[0], d: p[1], a: p[2], alpha: p[3], beta: p[4] })
-}
-
-fn unknown(what: &str, got: &str, choices: &str) -> PyErr {
-    CoreError::new_err(format!("{what} is '{got}', it must be {choices}"))
 }

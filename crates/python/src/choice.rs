@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use truearm_estimate::{
-    Choice as Core, ChoiceOptions, Criterion, Observability, choose_poses as choose,
+    Choice as Core, ChoiceOptions, Criterion, Observability, PoseRows, choose_poses as choose,
     independent_columns as independent, observability_of,
 };
 
@@ -85,13 +85,15 @@ pub fn choose_poses(
 
 /// Indices of a set of poses.
 #[pyfunction]
+#[pyo3(signature = (jacobian, columns, targets=1))]
 pub fn observability(
     py: Python<'_>,
     jacobian: PyReadonlyArray3<'_, f64>,
     columns: Vec<usize>,
+    targets: usize,
 ) -> PyResult<BTreeMap<&'static str, f64>> {
     let values = checked("jacobian", &jacobian, columns.len())?;
-    let rows = jacobian.shape()[1];
+    let rows = PoseRows::new(jacobian.shape()[1], targets);
     let found = quick(py, || observability_of(&values, rows, &columns))?;
     Ok(by_name(&found))
 }
@@ -104,7 +106,7 @@ pub fn independent_columns(
     columns: Vec<usize>,
 ) -> PyResult<Vec<usize>> {
     let values = checked("jacobian", &jacobian, columns.len())?;
-    let rows = jacobian.shape()[1];
+    let rows = PoseRows::new(jacobian.shape()[1], 1);
     quick(py, || independent(&values, rows, &columns))
 }
 

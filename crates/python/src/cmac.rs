@@ -7,11 +7,12 @@ use numpy::{
 use pyo3::prelude::*;
 use truearm_field::FieldError;
 use truearm_field::cmac::{
-    Composition, FitOptions, Membership, Network as Core, NetworkFit as CoreFit, NetworkOptions, Rate, Rows,
-    Scales, Sensor, Trained, TrainingEnd, TrainingOptions,
+    Composition, FitOptions, LinearRows, Membership, Network as Core, NetworkFit as CoreFit, NetworkOptions,
+    Rate, Scales, Sensor, Trained, TrainingEnd, TrainingOptions,
 };
 use truearm_kinematics::Cancel;
 
+use crate::arrays::{unknown, wrong_shape};
 use crate::chain::{contiguous, not_contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::measured::matrix;
@@ -47,10 +48,6 @@ impl Options {
     }
 }
 
-fn unknown(what: &str, got: &str, choices: &str) -> PyErr {
-    CoreError::new_err(format!("{what} is '{got}', it must be {choices}"))
-}
-
 /// Options of training by keyword.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -82,6 +79,7 @@ impl Training {
 #[pyo3(from_item_all)]
 pub struct Fitting {
     columns: Vec<usize>,
+    targets: usize,
     scales: Option<(f64, f64, f64)>,
     threads: Option<usize>,
 }
@@ -153,7 +151,7 @@ impl Network {
     fn with_weights(&self, weights: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
         let expected = [self.core.row_count(), self.core.output_count()];
         if weights.shape() != expected {
-            return Err(shape("weights", weights.shape(), &expected));
+            return Err(wrong_shape("weights", weights.shape(), &expected));
         }
         let values: Vec<f64> = weights.as_array().iter().copied().collect();
         let core = self.core.with_weights(&values).map_err(Failure::into_exception)?;
@@ -184,7 +182,7 @@ impl Network {
         let expected = [self.rows(&s)?, self.core.output_count()];
         let out = out.unwrap_or_else(|| PyArray2::zeros(py, expected, false));
         if out.shape() != expected {
-            return Err(shape("out", out.shape(), &expected));
+            return Err(wrong_shape("out", out.shape(), &expected));
         }
         if !out.is_c_contiguous() {
             return Err(not_contiguous("out"));
@@ -211,7 +209,7 @@ impl Network {
     ) -> PyResult<TrainedNetwork> {
         let expected = [self.rows(&s)?, self.core.output_count()];
         if ceps.shape() != expected {
-            return Err(shape("ceps", ceps.shape(), &expected));
+            return Err(wrong_shape("ceps", ceps.shape(), &expected));
         }
         options.check()?;
         let (inputs, wanted): (Vec<f64>, Vec<f64>) =
@@ -222,6 +220,7 @@ impl Network {
         Ok(TrainedNetwork { core })
     }
 
+    #[pyo3(signature = (s, jacobian, residual, options, targets=1))]
     fn train_on_measurements(
         &self,
         py: Python<'_>,
@@ -229,11 +228,12 @@ impl Network {
         jacobian: PyReadonlyArray3<'_, f64>,
         residual: PyReadonlyArray2<'_, f64>,
         options: Training,
+        targets: usize,
     ) -> PyResult<TrainedNetwork> {
         options.check()?;
         let linear = self.linear(&s, &jacobian, &residual)?;
         let core = long(py, |cancel| -> Result<_, FieldError> {
-            Ok(self.core.train_on_rows(&linear.rows(&options.columns), &options.core(cancel)?)?)
+            Ok(self.core.train_on_rows(&linear.rows(&options.columns, targets), &options.core(cancel)?)?)
         })?;
         Ok(TrainedNetwork { core })
     }
@@ -250,7 +250,8 @@ impl Network {
         let scales = options.scales.map(|(noise, roughness, level)| Scales { noise, roughness, level });
         let core = long(py, |cancel| {
             let how = FitOptions { scales, cancel: cancel.clone() };
-            with_threads(options.threads, || self.core.fit(&linear.rows(&options.columns), &how))
+            let rows = linear.rows(&options.columns, options.targets);
+            with_threads(options.threads, || self.core.fit(&rows, &how))
         })?;
         Ok(NetworkFit { core, rows: residual.shape()[1] })
     }
@@ -264,8 +265,9 @@ struct Linear {
 }
 
 impl Linear {
-    fn rows<'a>(&'a self, columns: &'a [usize]) -> Rows<'a> {
-        Rows { inputs: &self.inputs, jacobian: &self.jacobian, residual: &self.residual, columns }
+    fn rows<'a>(&'a self, columns: &'a [usize], targets: usize) -> LinearRows<'a> {
+        let Self { inputs, jacobian, residual } = self;
+        LinearRows { inputs, jacobian, residual, columns, targets }
     }
 }
 
@@ -273,7 +275,7 @@ impl Network {
     /// Rows of inputs, (n, I): n.
     fn rows(&self, s: &PyReadonlyArray2<'_, f64>) -> PyResult<usize> {
         let (found, inputs) = (s.shape(), self.core.input_count());
-        if found[1] == inputs { Ok(found[0]) } else { Err(shape("s", found, &[found[0], inputs])) }
+        if found[1] == inputs { Ok(found[0]) } else { Err(wrong_shape("s", found, &[found[0], inputs])) }
     }
 
     fn linear(
@@ -284,11 +286,11 @@ impl Network {
     ) -> PyResult<Linear> {
         let (poses, rows) = (self.rows(s)?, residual.shape()[1]);
         if residual.shape()[0] != poses {
-            return Err(shape("residual", residual.shape(), &[poses, rows]));
+            return Err(wrong_shape("residual", residual.shape(), &[poses, rows]));
         }
         let expected = [poses, rows, self.core.output_count()];
         if jacobian.shape() != expected {
-            return Err(shape("jacobian", jacobian.shape(), &expected));
+            return Err(wrong_shape("jacobian", jacobian.shape(), &expected));
         }
         Ok(Linear {
             inputs: s.as_array().iter().copied().collect(),
@@ -296,10 +298,6 @@ impl Network {
             residual: residual.as_array().iter().copied().collect(),
         })
     }
-}
-
-fn shape(name: &str, got: &[usize], wanted: &[usize]) -> PyErr {
-    CoreError::new_err(format!("{name} has shape {got:?}, it must be {wanted:?}"))
 }
 
 #[pymethods]

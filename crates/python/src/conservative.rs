@@ -8,10 +8,10 @@ use truearm_bank::{
 };
 use truearm_field::{ConservativePlan, Samples};
 
+use crate::arrays::lent;
 use crate::blocks::{block_from, block_into};
 use crate::chain::Chain;
 use crate::door::{CoreError, Failure, long, quick};
-use crate::field::numbers;
 use crate::measured::matrix;
 
 /// Bounds of the standard deviation, see the stub.
@@ -68,7 +68,7 @@ impl Conservative {
         let any = [f64::NEG_INFINITY, f64::INFINITY];
         let ranges: Vec<[f64; 2]> = stored.ranges.into_iter().map(|range| range.unwrap_or(any)).collect();
         let leverage = leverage
-            .map(|(chain, factor)| Leverage::new(chain.core(), stored.centre, &numbers(&factor)))
+            .map(|(chain, factor)| Leverage::new(chain.core(), stored.centre, &lent(&factor)))
             .transpose()
             .map_err(Failure::into_exception)?;
         let parts = ConservativeParts {
@@ -102,7 +102,7 @@ impl Conservative {
             centre: plan.centre,
             chain: chain.map(|chain| chain.core().clone()),
         };
-        let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(numbers);
+        let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(lent);
         let core = long(py, |cancel| {
             let samples = |k: usize| Samples { inputs: &arrays[k], std: &arrays[k + 1] };
             plan.fit(samples(0), samples(2), cancel)
@@ -143,7 +143,7 @@ impl Conservative {
         if found != expected {
             return Err(CoreError::new_err(format!("there are {found} inputs, {expected} are needed")));
         }
-        let inputs = numbers(&inputs);
+        let inputs = lent(&inputs);
         let values = quick(py, || self.core.std(&inputs))?;
         Ok(matrix(py, &values, BOUNDED))
     }

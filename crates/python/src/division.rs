@@ -10,14 +10,14 @@ use truearm_field::regions::{
     Active, Arm, Candidates, Division as Core, DivisionOptions, Halving, Order, PoseOptions, Recorded,
     Workspace, divide as divide_source,
 };
-use truearm_kinematics::Cancel;
 
+use crate::arrays::{numbers, unknown};
 use crate::chain::Chain;
 use crate::choice::criterion;
 use crate::door::{CoreError, Failure, quick};
-use crate::estimate::IdentificationProblem;
+use crate::estimate::{IdentificationProblem, check_columns};
 use crate::measured::{MeasurementSet, Setup, matrix, vector};
-use crate::regions::{Regions, numbers, whole};
+use crate::regions::{Regions, whole};
 
 /// Options of a division by keyword.
 #[derive(FromPyObject)]
@@ -53,12 +53,8 @@ impl Options<'_> {
             )));
         }
         let (accuracy, regions, seed) = (self.accuracy, self.regions, self.seed);
-        Ok(DivisionOptions { accuracy, regions, halving, order, seed, cancel: Cancel::default() })
+        Ok(DivisionOptions { accuracy, regions, halving, order, seed })
     }
-}
-
-fn unknown(what: &str, got: &str, choices: &str) -> PyErr {
-    CoreError::new_err(format!("{what} is '{got}', it must be {choices}"))
 }
 
 /// Options of active mode alone.
@@ -167,8 +163,9 @@ pub fn divide(
     let how = options.core()?;
     let parameters = numbers(&parameters);
     let all = chain.core().parameter_count();
-    if parameters.len() != all || columns.iter().any(|&column| column >= all) {
-        let text = format!("parameters must hold {all} values and columns be below {all}, got {columns:?}");
+    check_columns(&columns, all)?;
+    if parameters.len() != all {
+        let text = format!("parameters must hold {all} values, got {}", parameters.len());
         return Err(CoreError::new_err(text));
     }
     let (low, high, poses, limit) =
@@ -189,7 +186,6 @@ pub fn divide(
             criterion: by,
             passes: measuring.passes,
             orientation: measuring.orientation,
-            cancel: Cancel::default(),
         },
     };
     let core = quick(py, || divide_source(&arm, &mut source, (&low, &high), &how))?;

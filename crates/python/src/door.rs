@@ -62,8 +62,8 @@ impl<E: Worded> Failure for E {
     }
 }
 
-/// Work of at most some tens of milliseconds, or that needs no interrupt: without the lock, and on this thread but for processes
-/// that were forked.
+/// Work that is not interrupted, most of it of some tens of milliseconds: without the lock, and on this thread but for
+/// processes that were forked. Ctrl-C waits for its end, for seconds where rows are many.
 pub fn quick<T, E, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,

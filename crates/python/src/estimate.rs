@@ -1,6 +1,5 @@
 //! `_core.fit_constant` and its companions: constants, set-up, identifiability, residuals.
 
-use numpy::ndarray::Array3;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
@@ -12,6 +11,7 @@ use truearm_estimate::{
     non_negative_least_squares as non_negative, residuals as left_over,
 };
 
+use crate::arrays::array3;
 use crate::chain::Chain;
 use crate::door::{CoreError, Failure, quick, with_threads};
 use crate::measured::{MeasurementSet, Setup, matrix, vector};
@@ -46,12 +46,7 @@ impl IdentificationProblem {
         columns: Vec<usize>,
         world_is_known: bool,
     ) -> PyResult<Self> {
-        let count = chain.get().core().parameter_count();
-        if !columns.is_sorted_by(|a, b| a < b) || columns.iter().any(|&column| column >= count) {
-            return Err(CoreError::new_err(format!(
-                "columns must be ascending parameter indices below {count}, got {columns:?}"
-            )));
-        }
+        check_columns(&columns, chain.get().core().parameter_count())?;
         let joints = chain.get().core().joint_count();
         let given = measurements.get().core().joint_count;
         if joints != given {
@@ -62,6 +57,15 @@ impl IdentificationProblem {
         let frame = if world_is_known { FrameMode::World } else { FrameMode::Free };
         Ok(Self { chain, measurements, columns, frame })
     }
+}
+
+/// Refuses columns that are not ascending indices of so many parameters.
+pub fn check_columns(columns: &[usize], count: usize) -> PyResult<()> {
+    if columns.is_sorted_by(|a, b| a < b) && columns.iter().all(|&column| column < count) {
+        return Ok(());
+    }
+    let text = format!("columns must be ascending parameter indices below {count}, got {columns:?}");
+    Err(CoreError::new_err(text))
 }
 
 /// Prior of the corrections: standard deviations of lengths (m) and angles (rad), and whether the evidence scales
@@ -292,16 +296,6 @@ fn linearised(
     }
     let point = Point { parameters: &values, setup: setup.core() };
     quick(py, || linear(&core, point))
-}
-
-fn array3<'py>(
-    py: Python<'py>,
-    values: Vec<f64>,
-    shape: (usize, usize, usize),
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let array = Array3::from_shape_vec(shape, values)
-        .map_err(|error| CoreError::new_err(format!("the Jacobian: {error}")))?;
-    Ok(array.into_pyarray(py))
 }
 
 /// Unknowns that are not negative, see the stub.

@@ -1,10 +1,8 @@
 //! `_core.fit_field`, `_core.Field` and `_core.Posterior`: CEPs that vary.
 
-use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use numpy::ndarray::Array3;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
@@ -19,9 +17,10 @@ use truearm_field::{
 };
 use truearm_kinematics::Cancel;
 
+use crate::arrays::{array3, lent};
 use crate::asked::{Asked, Copies};
 use crate::blocks::{block_from, block_into, sag_into, up_of};
-use crate::chain::{Chain, contiguous};
+use crate::chain::Chain;
 use crate::door::{CoreError, Failure, in_parts, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
 use crate::hyper::{hyper_from, hyper_into};
@@ -64,15 +63,13 @@ impl Options<'_> {
             features: self.feature_ranges.iter().map(|&r| Input::line(r)).collect(),
             payloads: self.payloads.clone(),
             feature_values: self.features.as_array().iter().copied().collect(),
-            drives: Drives::of(&numbers(&self.coupling), |joint| problem.chain.slides(joint)),
+            drives: Drives::of(&lent(&self.coupling), |joint| problem.chain.slides(joint)),
             begin: self.begin()?,
             rough: self.rough,
             cancel,
         })
     }
-}
 
-impl Options<'_> {
     fn begin(&self) -> PyResult<Begin> {
         let near = self.near.as_ref().map(|fit| fit.core.start());
         match (&self.hyper, near, self.contested) {
@@ -280,7 +277,7 @@ impl Field {
                 constants.len()
             )));
         }
-        let (start, inputs) = (numbers(&constants), numbers(&inputs));
+        let (start, inputs) = (lent(&constants), lent(&inputs));
         let values = if poses < HELD_POSES {
             self.compiled.parameters(&start, &inputs).map_err(Failure::into_exception)
         } else {
@@ -292,24 +289,6 @@ impl Field {
 
 /// Below this many poses letting other Python threads run costs more than the work.
 const HELD_POSES: usize = 64;
-
-/// The numbers of an array row by row, copied only where they do not lie so.
-pub(crate) fn numbers<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> Cow<'a, [f64]> {
-    match contiguous("array", array) {
-        Ok(slice) => Cow::Borrowed(slice),
-        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
-    }
-}
-
-fn array3<'py>(
-    py: Python<'py>,
-    values: Vec<f64>,
-    shape: (usize, usize, usize),
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    Array3::from_shape_vec(shape, values)
-        .map(|array| array.into_pyarray(py))
-        .map_err(|error| CoreError::new_err(error.to_string()))
-}
 
 /// Standard deviations of a calibration, see the stub.
 #[pyclass(frozen, module = "truearm._core")]
@@ -385,11 +364,10 @@ impl Posterior {
         jacobian: PyReadonlyArray3<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = jacobian.shape()[1];
-        let copies = Copies::of(&inputs, &jacobian, None);
+        let copies = Copies::of(self.core(), &inputs, &jacobian, None)?;
         let asked = copies.asked();
-        let poses = asked.poses(self.core());
-        let values = in_parts(py, poses, AT_ONCE, |part| {
-            let Asked { inputs, jacobian, .. } = asked.part(&part, poses);
+        let values = in_parts(py, asked.poses, AT_ONCE, |part| {
+            let Asked { inputs, jacobian, .. } = asked.part(&part);
             self.core().prior(inputs, jacobian, rows)
         })?;
         Ok(matrix(py, &values, rows))
@@ -405,11 +383,10 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
+        let copies = Copies::of(self.core(), &inputs, &jacobian, setup.as_ref())?;
         let asked = copies.asked();
-        let whole = asked.poses(self.core());
-        let values = in_parts(py, whole, AT_ONCE, |part| {
-            let Asked { inputs, jacobian, setup } = asked.part(&part, whole);
+        let values = in_parts(py, asked.poses, AT_ONCE, |part| {
+            let Asked { inputs, jacobian, setup, .. } = asked.part(&part);
             self.core().covariance(inputs, jacobian, setup, rows)
         })?;
         array3(py, values, (poses, rows, rows))
@@ -425,8 +402,8 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
-        let Asked { inputs, jacobian, setup } = copies.asked();
+        let copies = Copies::of(self.core(), &inputs, &jacobian, setup.as_ref())?;
+        let Asked { inputs, jacobian, setup, .. } = copies.asked();
         let values = quick(py, || self.core().joint_covariance(inputs, jacobian, setup, rows))?;
         Ok(matrix(py, &values, poses * rows))
     }
@@ -442,8 +419,8 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
-        let Asked { inputs, jacobian, setup } = copies.asked();
+        let copies = Copies::of(self.core(), &inputs, &jacobian, setup.as_ref())?;
+        let Asked { inputs, jacobian, setup, .. } = copies.asked();
         let found = quick(py, || self.core().cross_covariance(first, inputs, jacobian, setup, rows))?;
         Ok(matrix(py, &found, (poses - first) * rows))
     }

@@ -3,6 +3,7 @@
 use pyo3::PyClass;
 use pyo3::prelude::*;
 
+mod arrays;
 mod asked;
 mod blocks;
 mod chain;
@@ -39,6 +40,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     door::open()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("ANGLE_ARM_M", truearm_kinematics::ANGLE_ARM)?;
+    module.add("STILL_M", truearm_field::STILL)?;
     module.add("NORMAL_95", truearm_field::QUANTILE_95)?;
     module.add("CoreError", module.py().get_type::<door::CoreError>())?;
     add_class::<chain::Chain>(module)?;

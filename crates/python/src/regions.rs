@@ -13,6 +13,7 @@ use truearm_field::regions::{
     Method, Parts, RegionalFit as CoreFit, Regions as Core, fill_without_data as fill, regional_ceps as fit,
 };
 
+use crate::arrays::numbers;
 use crate::door::{CoreError, Failure, quick};
 use crate::estimate::IdentificationProblem;
 use crate::measured::{Setup, matrix, vector};
@@ -34,11 +35,6 @@ impl Regions {
         }
         Err(CoreError::new_err(format!("region {leaf} is no leaf, leaves are {:?}", self.core.leaves())))
     }
-}
-
-/// The numbers of an array row by row.
-pub fn numbers<D: numpy::ndarray::Dimension>(array: &numpy::PyReadonlyArray<'_, f64, D>) -> Vec<f64> {
-    array.as_array().iter().copied().collect()
 }
 
 fn integers<'py>(py: Python<'py>, values: impl Iterator<Item = i64>) -> Bound<'py, PyArray1<i64>> {

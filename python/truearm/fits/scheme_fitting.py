@@ -160,7 +160,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
         "halving": options.halving,
         "order": "worst",
         "poses": options.region_rows,
-        "limit": CONDITION_OF_WHOLE * observability(jacobian, list(rows.columns))["kappa"],
+        "limit": CONDITION_OF_WHOLE * observability(jacobian, list(rows.columns), _targets(rows))["kappa"],
         "seed": rows.seed,
     }
     regions = divide_rows(rows.problem, parameters, setup, features, judges, division).regions
@@ -194,10 +194,20 @@ def _train_on_ceps(
 def _fit_on_measurements(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit:
     jacobian, residual = linearise(rows.problem, rows.constant.parameters, rows.constant.setup)
     _, features = _features(rows, options)
-    how: NetworkFitOptions = {"columns": list(rows.columns), "scales": None, "threads": None}
+    how: NetworkFitOptions = {
+        "columns": list(rows.columns),
+        "targets": _targets(rows),
+        "scales": None,
+        "threads": None,
+    }
     fitted = _empty(name, rows, options).fit(features, jacobian, residual, how)
     details = SchemeDetails(ended="noise and roughness by the largest evidence")
     return SchemeFit(_kept(name, rows, options, fitted.network), details)
+
+
+def _targets(rows: SchemeRows) -> int:
+    """Targets of a pose."""
+    return int(rows.constant.setup.targets.shape[1])
 
 
 def _empty(name: str, rows: SchemeRows, options: SchemeOptions) -> Network:

@@ -5,12 +5,13 @@ from typing import Final
 
 import numpy as np
 
+from truearm._core import STILL_M
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 STILL_DEG: Final = 0.5
 """More than what a controller that stops where it is told to differs by, less than what anybody measures."""
-STILL_MM: Final = 0.5
+STILL_MM: Final = MM_PER_METRE * STILL_M
 CARRIED: Final = 1e-3
 """Degrees or millimetres by which readings differ that are one place."""
 

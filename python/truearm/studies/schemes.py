@@ -157,7 +157,7 @@ def _fitted_network(
 ) -> tuple[Scheme, tuple[float, float, float]]:
     jacobian, residual = linearise(made.problem, constant, made.setup)
     empty = Network(made.sensors, len(made.columns), network)
-    how: NetworkFitOptions = {"columns": made.columns, "scales": scales, "threads": None}
+    how: NetworkFitOptions = {"columns": made.columns, "targets": 1, "scales": scales, "threads": None}
     fitted = empty.fit(made.features, jacobian, residual, how)
     return _network(made, constant, fitted.network, {}), fitted.scales
 

@@ -32,7 +32,7 @@ impl<'a, const M: usize> Present<'a, M> {
     /// Begins with chosen candidates and M^t M (P, P) of what was measured already.
     ///
     /// # Errors
-    /// [`EstimateError::NotFinite`] where the candidates' Jacobians are zero or not finite.
+    /// [`EstimateError::Untelling`] where the candidates' Jacobians are zero.
     pub fn new(pool: &'a mut Pool<M>, given: &Mat<f64>, chosen: &[usize]) -> Result<Self, EstimateError> {
         let width = pool.width;
         let size =
@@ -53,8 +53,7 @@ impl<'a, const M: usize> Present<'a, M> {
             let jacobian = self.pool.jacobian(pose);
             normal += jacobian.transpose() * &jacobian;
         }
-        let failed = EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 };
-        self.inverse = Cholesky::new(normal, Par::Seq).ok_or(failed)?.inverse();
+        self.inverse = Cholesky::new(normal, Par::Seq).ok_or(EstimateError::Untelling)?.inverse();
         self.pool.renew(&self.inverse);
         self.changes = 0;
         Ok(())
@@ -68,7 +67,7 @@ impl<'a, const M: usize> Present<'a, M> {
         };
         let (pose, gain) = gains.fold((usize::MAX, 0.0), better);
         if pose == usize::MAX {
-            return Err(EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 });
+            return Err(EstimateError::Untelling);
         }
         self.change(pose, 1.0)?;
         self.is_chosen[pose] = true;
@@ -78,16 +77,13 @@ impl<'a, const M: usize> Present<'a, M> {
 
     fn change(&mut self, pose: usize, sign: f64) -> Result<(), EstimateError> {
         self.changes += 1;
-        match self.pool.exchange(&mut self.inverse, pose, sign) {
-            Some(()) => Ok(()),
-            None => Err(EstimateError::NotFinite { what: "the Jacobian of a candidate", pose }),
-        }
+        self.pool.exchange(&mut self.inverse, pose, sign).ok_or(EstimateError::Untelling)
     }
 
     /// Adds candidates until there are `count`.
     ///
     /// # Errors
-    /// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
+    /// [`EstimateError::Untelling`], [`EstimateError::Cancelled`].
     pub fn fill(&mut self, count: usize, cancel: &Cancel) -> Result<(), EstimateError> {
         while self.chosen.len() < count {
             cancel.check()?;
@@ -102,7 +98,7 @@ impl<'a, const M: usize> Present<'a, M> {
     /// Exchanges until nothing better is found, or `most` times; gives how many exchanges were made.
     ///
     /// # Errors
-    /// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
+    /// [`EstimateError::Untelling`], [`EstimateError::Cancelled`].
     pub fn settle(&mut self, most: usize, cancel: &Cancel) -> Result<usize, EstimateError> {
         for made in 0..most {
             cancel.check()?;

@@ -7,7 +7,7 @@ use crate::choice::observability::{Criterion, Observability, observability};
 use crate::choice::pool::Pool;
 use crate::choice::spectral;
 use crate::dense::transposed_product;
-use crate::scale::scaled_jacobian;
+use crate::scale::{PoseRows, scaled_jacobian};
 use truearm_kinematics::Cancel;
 
 use crate::EstimateError;
@@ -48,21 +48,26 @@ pub struct Choice {
     pub well_conditioned: bool,
 }
 
-/// Choose poses from candidates with Jacobians (N, m, P), m and rad, of `rows` rows each, 6 at most.
+/// Choose poses from candidates with Jacobians (N, m, P), m and rad, of `rows` rows each, 6 at most: a target's position
+/// and, behind it, its orientation.
 ///
 /// # Errors
-/// [`EstimateError`] where lengths do not fit, a value is not finite, or there are fewer candidates than poses.
+/// [`EstimateError`] where lengths do not fit, a value is not finite, all are zero, or there are fewer candidates than poses.
 pub fn choose_poses(
     jacobian: &[f64],
     rows: usize,
     options: &ChoiceOptions<'_>,
 ) -> Result<Choice, EstimateError> {
     check(jacobian, rows, options)?;
-    let scaled = scaled_jacobian(jacobian, rows, options.columns);
+    let scaled = scaled_jacobian(jacobian, of_one_target(rows), options.columns);
     match rows {
         ..=3 => choose::<3>(&scaled, rows, options),
         _ => choose::<6>(&scaled, rows, options),
     }
+}
+
+fn of_one_target(rows: usize) -> PoseRows {
+    PoseRows::new(rows, 1)
 }
 
 fn choose<const M: usize>(
@@ -71,7 +76,7 @@ fn choose<const M: usize>(
     options: &ChoiceOptions<'_>,
 ) -> Result<Choice, EstimateError> {
     let width = options.columns.len();
-    let given = scaled_jacobian(options.given, rows, options.columns);
+    let given = scaled_jacobian(options.given, of_one_target(rows), options.columns);
     let given_rows = Mat::from_fn(given.len() / width, width, |i, j| given[i * width + j]);
     let normal = transposed_product(given_rows.as_ref(), given_rows.as_ref());
     let mut pool = Pool::<M>::new(scaled, rows, width);

@@ -4,7 +4,7 @@ use faer::Mat;
 
 use crate::EstimateError;
 use crate::dense::singular_values;
-use crate::scale::scaled_matrix;
+use crate::scale::{PoseRows, scaled_matrix};
 
 /// What a choice of poses is to make best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,15 +109,15 @@ pub fn observability(matrix: &Mat<f64>, poses: usize) -> Result<Observability, E
     })
 }
 
-/// Indices of poses with Jacobians (n, m, P) of m rows, m and rad, of the parameters `columns`.
+/// Indices of poses with Jacobians (n, m, P), m and rad, of the parameters `columns`.
 ///
 /// # Errors
 /// [`EstimateError`] where lengths do not fit or a value is not finite.
 pub fn observability_of(
     jacobian: &[f64],
-    rows: usize,
+    rows: PoseRows,
     columns: &[usize],
 ) -> Result<Observability, EstimateError> {
     let matrix = scaled_matrix(jacobian, rows, columns)?;
-    observability(&matrix, matrix.nrows() / rows)
+    observability(&matrix, matrix.nrows() / rows.count)
 }

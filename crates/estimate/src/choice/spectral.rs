@@ -19,7 +19,6 @@ const TRIED: usize = 32;
 const BETTER: f64 = 1e-9;
 /// Eigenvalues below this share of the largest one count as this share.
 const LEAST_SHARE: f64 = 1e-14;
-const NOT_FINITE: EstimateError = EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 };
 
 /// Eigenvalues, ascending, and eigenvectors of a symmetric matrix.
 struct Spectrum {
@@ -29,7 +28,7 @@ struct Spectrum {
 
 impl Spectrum {
     fn new(matrix: &Mat<f64>) -> Result<Self, EstimateError> {
-        let Eigen { values, vectors } = Eigen::new(matrix).ok_or(NOT_FINITE)?;
+        let Eigen { values, vectors } = Eigen::new(matrix).ok_or(EstimateError::Untelling)?;
         Ok(Self { values, vectors })
     }
 
@@ -93,7 +92,7 @@ fn negative_pivots(mut a: Mat<f64>) -> usize {
 /// Exchanges until a pass through the chosen poses changes nothing, or `passes` times; gives how many were made.
 ///
 /// # Errors
-/// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
+/// [`EstimateError::Untelling`], [`EstimateError::Cancelled`].
 pub fn settle<const M: usize>(
     pool: &Pool<M>,
     given: &Mat<f64>,
@@ -105,7 +104,7 @@ pub fn settle<const M: usize>(
     chosen.iter().for_each(|&pose| is_chosen[pose] = true);
     let mut normal = given.clone();
     chosen.iter().for_each(|&pose| add(&mut normal, &pool.jacobian(pose), 1.0));
-    let mut best = criterion.value(&eigenvalues(&normal).ok_or(NOT_FINITE)?);
+    let mut best = criterion.value(&eigenvalues(&normal).ok_or(EstimateError::Untelling)?);
     let mut exchanges = 0;
     for _ in 0..passes {
         let before = exchanges;
@@ -153,7 +152,7 @@ fn better<const M: usize>(
         }
         let mut with = without.clone();
         add(&mut with, &jacobian, 1.0);
-        let value = criterion.value(&eigenvalues(&with).ok_or(NOT_FINITE)?);
+        let value = criterion.value(&eigenvalues(&with).ok_or(EstimateError::Untelling)?);
         if value > best {
             (found, best) = (Some((pose, value)), value);
         }

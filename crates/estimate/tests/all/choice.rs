@@ -3,7 +3,7 @@
 
 use crate::common::stream::Stream;
 use truearm_estimate::{
-    Choice, ChoiceOptions, Criterion, EstimateError, Observability, choose_poses, observability_of,
+    Choice, ChoiceOptions, Criterion, EstimateError, Observability, PoseRows, choose_poses, observability_of,
 };
 use truearm_kinematics::{Cancel, Cancelled};
 
@@ -57,7 +57,7 @@ fn of(jacobian: &[f64], rows: usize, chosen: &[usize]) -> Observability {
     let width = 5 * rows;
     let part: Vec<f64> =
         chosen.iter().flat_map(|&k| &jacobian[k * width..(k + 1) * width]).copied().collect();
-    observability_of(&part, rows, &COLUMNS).unwrap()
+    observability_of(&part, PoseRows::new(rows, 1), &COLUMNS).unwrap()
 }
 
 /// The best value of all choices of three.
@@ -123,7 +123,7 @@ fn reported_indices_are_those_of_the_chosen_rows() {
 fn indices_of_a_diagonal_matrix_are_known() {
     // Columns of two lengths in metres per metre and an angle, which counts at 0.3 m.
     let jacobian = [3.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.3];
-    let found = observability_of(&jacobian, 3, &[1, 2, 3]).unwrap();
+    let found = observability_of(&jacobian, PoseRows::new(3, 1), &[1, 2, 3]).unwrap();
     let expected = [3.0, 6.0_f64.cbrt(), 1.0 / 3.0, 1.0, 1.0 / 3.0, 6.0 / 11.0, 2.0 * 6.0_f64.ln()];
     let got = [found.kappa, found.o1, found.o2, found.o3, found.o4, found.o5, found.log_determinant];
     crate::common::assert_close(&got, &expected, 1e-12);

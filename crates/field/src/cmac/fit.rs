@@ -11,7 +11,7 @@ use truearm_estimate::{EstimateError, column_unit};
 use truearm_kinematics::Cancel;
 
 use crate::FieldError;
-use crate::cmac::gain::Rows;
+use crate::cmac::gain::LinearRows;
 use crate::cmac::network::Network;
 use crate::cmac::roughness::Modes;
 use crate::compass::Compass;
@@ -65,7 +65,7 @@ impl Network {
     /// # Errors
     /// [`EstimateError`] where an array does not fit, the network is hashed (its rows have no neighbours) or too large,
     /// there are too many rows, or on request; [`FieldError::NotPositiveDefinite`] where values are far outside the model.
-    pub fn fit(&self, rows: &Rows<'_>, options: &FitOptions) -> Result<NetworkFit, FieldError> {
+    pub fn fit(&self, rows: &LinearRows<'_>, options: &FitOptions) -> Result<NetworkFit, FieldError> {
         let (poses, per_pose) = rows.check(self)?;
         self.check_size(poses * per_pose)?;
         let modes = Modes::new(self)?;
@@ -118,7 +118,7 @@ impl Network {
         Ok(())
     }
 
-    fn left_over(&self, rows: &Rows<'_>, per_pose: usize) -> Result<Vec<f64>, EstimateError> {
+    fn left_over(&self, rows: &LinearRows<'_>, per_pose: usize) -> Result<Vec<f64>, EstimateError> {
         let width = rows.columns.len();
         let mut ceps = vec![0.0; rows.residual.len() / per_pose.max(1) * width];
         self.output(rows.inputs, &mut ceps)?;

@@ -1,7 +1,7 @@
 //! Linearised measurements as patterns: a residual asks for the smallest change of CEPs that explains it.
 
 use faer::{Mat, Par};
-use truearm_estimate::{EstimateError, column_unit, dense::Cholesky, row_unit, scaled_jacobian};
+use truearm_estimate::{EstimateError, PoseRows, column_unit, dense::Cholesky, scaled_jacobian};
 use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::cmac::network::Network;
@@ -9,18 +9,20 @@ use crate::cmac::training::{Measure, Patterns, Trained, TrainingOptions, check_l
 
 /// Linearised measurements of n poses: `residual = jacobian CEP + noise`.
 #[derive(Debug, Clone, Copy)]
-pub struct Rows<'a> {
+pub struct LinearRows<'a> {
     /// Inputs of the network, (n, I).
     pub inputs: &'a [f64],
-    /// (n, m, P); m is 3 for positions, 6 for poses.
+    /// (n, m, P): three rows of each target's position, then three of the orientation if it was measured.
     pub jacobian: &'a [f64],
     /// (n, m), m and rad.
     pub residual: &'a [f64],
     /// Driven parameters, (P,): 5 * link + (theta, d, a, alpha, beta).
     pub columns: &'a [usize],
+    /// Targets of a pose.
+    pub targets: usize,
 }
 
-impl Rows<'_> {
+impl LinearRows<'_> {
     /// Rows of a pose, m.
     pub fn rows_per_pose(&self, poses: usize) -> usize {
         self.residual.len() / poses.max(1)
@@ -33,6 +35,16 @@ impl Rows<'_> {
     pub fn check(&self, network: &Network) -> Result<(usize, usize), EstimateError> {
         let poses = network.check_inputs(self.inputs)?;
         let rows = self.rows_per_pose(poses);
+        let positions = 3 * self.targets;
+        if rows == 0 || (rows != positions && rows != positions + 3) {
+            let rule = "a pose has three for each target, and three more where orientation was measured: give the \
+                        number of targets";
+            return Err(EstimateError::Option {
+                what: "the number of rows of a pose",
+                value: rows as f64,
+                rule,
+            });
+        }
         check_length("the driven parameters", self.columns.len(), network.output_count())?;
         check_length("the residuals", self.residual.len(), poses * rows)?;
         check_length("the Jacobian", self.jacobian.len(), poses * rows * self.columns.len())?;
@@ -47,9 +59,9 @@ impl Rows<'_> {
 
     /// Rows and columns in metres and in units of a millimetre's worth: (n, m, P) and (n, m).
     pub fn scaled(&self, rows: usize) -> (Vec<f64>, Vec<f64>) {
-        let jacobian = scaled_jacobian(self.jacobian, rows, self.columns);
-        let residual = self.residual.iter().enumerate().map(|(at, r)| r * row_unit(at % rows)).collect();
-        (jacobian, residual)
+        let kinds = PoseRows::new(rows, self.targets);
+        let residual = self.residual.iter().enumerate().map(|(at, r)| r * kinds.unit(at)).collect();
+        (scaled_jacobian(self.jacobian, kinds, self.columns), residual)
     }
 }
 
@@ -62,7 +74,7 @@ impl Network {
     /// As [`Network::train`].
     pub fn train_on_rows(
         &self,
-        rows: &Rows<'_>,
+        rows: &LinearRows<'_>,
         options: &TrainingOptions,
     ) -> Result<Trained, EstimateError> {
         let (poses, per_pose) = rows.check(self)?;
@@ -89,7 +101,7 @@ struct Explained<'a> {
 }
 
 impl<'a> Explained<'a> {
-    fn new(rows: &Rows<'a>, poses: usize, per_pose: usize) -> Result<Self, EstimateError> {
+    fn new(rows: &LinearRows<'a>, poses: usize, per_pose: usize) -> Result<Self, EstimateError> {
         let (jacobian, residual) = rows.scaled(per_pose);
         let width = rows.columns.len();
         let mut gain = Vec::with_capacity(jacobian.len());

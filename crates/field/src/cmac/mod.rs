@@ -18,7 +18,7 @@ mod tests;
 mod training;
 
 pub use fit::{FitOptions, NetworkFit, Scales};
-pub use gain::Rows;
+pub use gain::LinearRows;
 pub use network::{Composition, Network, NetworkOptions};
 pub use sensor::{Membership, Sensor};
 pub use training::{Patterns, Rate, Trained, TrainingEnd, TrainingOptions};

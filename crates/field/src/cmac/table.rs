@@ -2,6 +2,8 @@
 
 use truearm_estimate::EstimateError;
 
+use crate::mixed::mixed;
+
 /// Rows of a dense table at most; larger networks need hash coding.
 const MOST_ROWS: u64 = 1 << 24;
 
@@ -47,13 +49,4 @@ impl Table {
             Table::Hashed { rows } => ((u128::from(mixed(cell)) * rows as u128) >> 64) as usize,
         }
     }
-}
-
-/// Bits spread over the whole word (the finaliser of SplitMix64; Steele, Lea and Flood 2014).
-#[inline(always)]
-fn mixed(cell: u64) -> u64 {
-    let mut z = cell.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

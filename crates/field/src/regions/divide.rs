@@ -5,12 +5,13 @@
 //! estimated from ill-conditioned poses; a half that cannot be reached stays without CEPs.
 
 use truearm_estimate::{EstimateError, FrameMode, MeasurementSet, Problem, Setup};
-use truearm_kinematics::{Cancel, Chain};
+use truearm_kinematics::Chain;
 
 use crate::FieldError;
+use crate::mixed::mixed;
 use crate::regions::estimate::Held;
 use crate::regions::regional::undetermined;
-use crate::regions::source::{Prepared, Rows, Source, Verdict};
+use crate::regions::source::{Prepared, RegionRows, Source, Verdict};
 use crate::regions::tree::Regions;
 use crate::regions::trend;
 
@@ -45,8 +46,6 @@ pub struct DivisionOptions {
     pub order: Order,
     /// Everything drawn follows from it.
     pub seed: u64,
-    /// Looked at between regions.
-    pub cancel: Cancel,
 }
 
 /// Why a leaf was not halved.
@@ -118,7 +117,7 @@ impl Arm<'_> {
 /// Divide the workspace between two corners (F,).
 ///
 /// # Errors
-/// The source's, and [`FieldError`] where the whole workspace has too few or ill-conditioned poses, or on request.
+/// The source's, and [`FieldError`] where the whole workspace has too few or ill-conditioned poses.
 pub fn divide<S: Source>(
     arm: &Arm<'_>,
     source: &mut S,
@@ -130,7 +129,6 @@ pub fn divide<S: Source>(
         Work { arm, source, options, division: Division::of(regions), open: Vec::new(), rows: Vec::new() };
     work.whole()?;
     while let Some(region) = work.next() {
-        options.cancel.check().map_err(FieldError::from)?;
         if work.division.regions.leaves().len() >= options.regions {
             work.division.ended[region] = Some(Ended::RegionLimit);
         } else {
@@ -160,7 +158,7 @@ struct Work<'a, S> {
     /// Leaves that are not accurate enough, in the order of their making.
     open: Vec<usize>,
     /// Measurements of every region.
-    rows: Vec<Option<Rows>>,
+    rows: Vec<Option<RegionRows>>,
 }
 
 impl<S: Source> Work<'_, S> {
@@ -244,7 +242,7 @@ impl<S: Source> Work<'_, S> {
     }
 
     /// Regions are entered in the order of their numbers.
-    fn record(&mut self, ceps: &[f64], (kappa, error): (f64, f64), rows: Option<Rows>) {
+    fn record(&mut self, ceps: &[f64], (kappa, error): (f64, f64), rows: Option<RegionRows>) {
         self.division.ceps.extend(ceps);
         self.division.kappa.push(kappa);
         self.division.error.push(error);
@@ -289,12 +287,4 @@ impl<S: Source> Work<'_, S> {
             _ => Ok(longest),
         }
     }
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
-fn mixed(mut z: u64) -> u64 {
-    z = z.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatRef, Par};
 use truearm_estimate::dense::{Cholesky, to_vec, transposed_product};
-use truearm_estimate::{Linearised, Point, Problem, Setup, column_unit, linearise, row_unit};
+use truearm_estimate::{Linearised, Point, PoseRows, Problem, Setup, column_unit, linearise};
 
 use crate::FieldError;
 
@@ -93,10 +93,8 @@ pub fn solve(matrix: MatRef<f64>, right: MatRef<f64>) -> Option<Vec<f64>> {
 /// Weighted rows in metres: matrix (n m, P) and residual (n m, 1).
 pub fn scaled(problem: &Problem<'_>, rows: &Linearised) -> (Mat<f64>, Mat<f64>) {
     let width = problem.columns.len();
-    let weight = |row: usize| {
-        let weight = problem.measurements.weight[row / rows.rows];
-        row_unit(if row % rows.rows < 3 * problem.measurements.target_count { 0 } else { 3 }) * weight.sqrt()
-    };
+    let kinds = PoseRows::new(rows.rows, problem.measurements.target_count);
+    let weight = |row: usize| kinds.unit(row) * problem.measurements.weight[row / rows.rows].sqrt();
     let matrix = Mat::from_fn(rows.residual.len(), width, |row, k| {
         rows.arm[row * width + k] * weight(row) / column_unit(problem.columns[k])
     });

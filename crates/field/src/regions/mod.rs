@@ -16,6 +16,6 @@ mod workspace;
 pub use divide::{Arm, Division, DivisionOptions, Ended, Halving, Order, divide};
 pub use recorded::Recorded;
 pub use regional::{Method, RegionalFit, fill_without_data, regional_ceps};
-pub use source::{Prepared, Rows, Source, Verdict};
+pub use source::{Prepared, RegionRows, Source, Verdict};
 pub use tree::{Parts, Regions};
 pub use workspace::{Active, Candidates, PoseOptions, Workspace};

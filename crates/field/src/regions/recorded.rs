@@ -4,7 +4,7 @@ use truearm_estimate::{MeasurementSet, Problem, Setup, observability};
 
 use crate::FieldError;
 use crate::regions::estimate::{Held, scaled};
-use crate::regions::source::{Prepared, Rows, Source, Verdict};
+use crate::regions::source::{Prepared, RegionRows, Source, Verdict};
 
 /// A data set with features, some rows of which judge and take no part in any fit.
 pub struct Recorded<'a> {
@@ -67,9 +67,15 @@ impl Source for Recorded<'_> {
         Ok(Prepared { verdict, joints: Vec::new(), rows })
     }
 
-    fn rows(&mut self, prepared: &Prepared, low: &[f64], high: &[f64], _: u64) -> Result<Rows, FieldError> {
+    fn rows(
+        &mut self,
+        prepared: &Prepared,
+        low: &[f64],
+        high: &[f64],
+        _: u64,
+    ) -> Result<RegionRows, FieldError> {
         let (identify, identify_features) = self.subset(&prepared.rows);
         let (judge, judge_features) = self.subset(&self.within(low, high, true));
-        Ok(Rows { identify, judge, identify_features, judge_features })
+        Ok(RegionRows { identify, judge, identify_features, judge_features })
     }
 }

@@ -85,23 +85,48 @@ fn upwards(regions: &Regions, own: &[Own], spread: Spread) -> Option<(Vec<Messag
     Some((messages, evidence, explained))
 }
 
+/// Squares and rows of all regions.
+fn totals(own: &[Own]) -> (f64, usize) {
+    own.iter().fold((0.0, 0), |sum, o| (sum.0 + o.squares, sum.1 + o.rows))
+}
+
 /// Evidence at its best noise, and that noise.
 fn evidence(regions: &Regions, own: &[Own], [halving, finer]: [f64; 2]) -> Option<(f64, f64)> {
     let spread = Spread { noise: 1.0, halving: halving.exp(), finer: finer.exp() };
     let (_, evidence, explained) = upwards(regions, own, spread)?;
-    let (squares, rows) = own.iter().fold((0.0, 0), |sum, o| (sum.0 + o.squares, sum.1 + o.rows));
+    let (squares, rows) = totals(own);
     let variance = ((squares - explained) / rows as f64).max(f64::MIN_POSITIVE);
     Some((evidence - 0.5 * rows as f64 * variance.ln(), variance.sqrt()))
 }
 
+/// Evidence of a noise, by the given deviation of every half over it, and that noise.
+fn evidence_of_noise(regions: &Regions, own: &[Own], halving: f64, ratio: f64) -> Option<(f64, f64)> {
+    let spread = Spread { noise: 1.0, halving: ratio.exp(), finer: 1.0 };
+    let (_, evidence, explained) = upwards(regions, own, spread)?;
+    let (noise, (squares, rows)) = (halving / ratio.exp(), totals(own));
+    let of_rows = rows as f64 * noise.ln() + 0.5 * (squares - explained) / (noise * noise);
+    Some((evidence - of_rows, noise))
+}
+
+/// The spread of maximum evidence: all of it, or the noise beside a given deviation of every half.
+fn found(regions: &Regions, own: &[Own], halving: Option<f64>) -> Option<Spread> {
+    let ([ratio, finer], _, noise) = RATIOS
+        .search(|[ratio, finer]| {
+            Ok::<_, ()>(match halving {
+                Some(halving) if finer == 0.0 => evidence_of_noise(regions, own, halving, ratio),
+                Some(_) => None,
+                None => evidence(regions, own, [ratio, finer]),
+            })
+        })
+        .ok()??;
+    let halving = halving.unwrap_or(noise * ratio.exp());
+    Some(Spread { noise, halving, finer: finer.exp() })
+}
+
 /// CEPs of all regions in metres, (N, P), and the spread: found from the rows, or with the given deviation of every half.
 pub fn shrunk(regions: &Regions, own: &[Own], halving: Option<f64>) -> Option<(Vec<Vec<f64>>, Spread)> {
-    let found = RATIOS.search(|ratios| Ok::<_, ()>(evidence(regions, own, ratios))).ok()??;
-    let ([ratio, finer], _, noise) = found;
-    let spread = match halving {
-        Some(halving) => Spread { noise, halving, finer: 1.0 },
-        None => Spread { noise, halving: noise * ratio.exp(), finer: finer.exp() },
-    };
+    let spread = found(regions, own, halving)?;
+    let noise = spread.noise;
     let in_noise = Spread { noise: 1.0, halving: spread.halving / noise, ..spread };
     let (messages, _, _) = upwards(regions, own, in_noise)?;
     let mut ceps: Vec<Vec<f64>> = Vec::with_capacity(regions.count());
@@ -179,6 +204,30 @@ mod tests {
         }
         // A region without rows is like the one that it is half of.
         assert!((ceps[4][0] - ceps[2][0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_noise_beside_a_given_halving_is_of_maximum_evidence() {
+        let regions = tree();
+        let own = own(&regions);
+        let halving = 0.05;
+        let (_, spread) = shrunk(&regions, &own, Some(halving)).unwrap();
+        assert_eq!((spread.halving, spread.finer), (halving, 1.0));
+        let evidence = |noise: f64| {
+            let (precision, right) =
+                joint(&regions, &own, Spread { noise: 1.0, halving: halving / noise, finer: 1.0 });
+            let factor = Cholesky::new(precision, Par::Seq).unwrap();
+            let explained: f64 = factor.solve_vector(&right).iter().zip(&right).map(|(a, b)| a * b).sum();
+            let halves = 2.0 * (regions.count() - 1) as f64;
+            let (squares, rows) = totals(&own);
+            -0.5 * factor.log_determinant()
+                - halves * (halving / noise).ln()
+                - rows as f64 * noise.ln()
+                - 0.5 * (squares - explained) / (noise * noise)
+        };
+        for factor in [0.8, 1.25] {
+            assert!(evidence(spread.noise) > evidence(factor * spread.noise), "{spread:?} {factor}");
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct Prepared {
 
 /// Measurements of a region.
 #[derive(Debug, Clone)]
-pub struct Rows {
+pub struct RegionRows {
     /// To identify CEPs from.
     pub identify: MeasurementSet,
     /// To judge them by.
@@ -57,5 +57,5 @@ pub trait Source {
         low: &[f64],
         high: &[f64],
         seed: u64,
-    ) -> Result<Rows, Self::Error>;
+    ) -> Result<RegionRows, Self::Error>;
 }

@@ -6,7 +6,7 @@ use truearm_estimate::MeasurementSet;
 use crate::FieldError;
 use crate::regions::divide::Arm;
 use crate::regions::estimate::{scaled, solve};
-use crate::regions::source::Rows;
+use crate::regions::source::RegionRows;
 
 /// Axes by how much smaller the squares become when CEPs may differ between the halves, the best first.
 ///
@@ -16,7 +16,7 @@ use crate::regions::source::Rows;
 /// [`FieldError::Estimate`] where rows are another set-up's.
 pub fn best_first(
     arm: &Arm<'_>,
-    rows: &Rows,
+    rows: &RegionRows,
     ceps: &[f64],
     (low, high): (&[f64], &[f64]),
     axes: Vec<usize>,

@@ -7,7 +7,7 @@ use truearm_estimate::{
 use truearm_kinematics::{Cancel, Chain};
 
 use crate::FieldError;
-use crate::regions::source::{Prepared, Rows, Source, Verdict};
+use crate::regions::source::{Prepared, RegionRows, Source, Verdict};
 
 /// Poses that may be measured.
 #[derive(Debug, Clone, Default)]
@@ -54,8 +54,6 @@ pub struct PoseOptions {
     pub passes: usize,
     /// Whether orientations are measured.
     pub orientation: bool,
-    /// Looked at between exchanges.
-    pub cancel: Cancel,
 }
 
 /// A workspace that is measured on demand.
@@ -99,7 +97,7 @@ impl<W: Workspace> Source for Active<'_, W> {
             start: None,
             limit: Some(options.limit),
             passes: options.passes,
-            cancel: options.cancel.clone(),
+            cancel: Cancel::default(),
         };
         let choice = choose_poses(&jacobian, rows, &how).map_err(FieldError::from)?;
         let kappa = choice.after.kappa;
@@ -109,7 +107,13 @@ impl<W: Workspace> Source for Active<'_, W> {
         Ok(Prepared { verdict, joints: joints.collect(), rows: choice.chosen })
     }
 
-    fn rows(&mut self, prepared: &Prepared, low: &[f64], high: &[f64], seed: u64) -> Result<Rows, W::Error> {
+    fn rows(
+        &mut self,
+        prepared: &Prepared,
+        low: &[f64],
+        high: &[f64],
+        seed: u64,
+    ) -> Result<RegionRows, W::Error> {
         let dimensions = low.len();
         let found = self.workspace.candidates(low, high, self.options.candidates, seed)?;
         let features = |k: &usize| found.features[k * dimensions..(k + 1) * dimensions].to_vec();
@@ -118,7 +122,7 @@ impl<W: Workspace> Source for Active<'_, W> {
         let tests = self.workspace.candidates(low, high, self.options.tests, seed ^ TESTS)?;
         self.count(&tests, dimensions)?;
         let judge = self.measured(&tests.joints)?;
-        Ok(Rows { identify, judge, identify_features, judge_features: tests.features })
+        Ok(RegionRows { identify, judge, identify_features, judge_features: tests.features })
     }
 }
 

@@ -2,7 +2,7 @@ use faer::Mat;
 use truearm_estimate::dense::Orthogonal;
 
 use super::{GAUSSIAN, inputs, made, network};
-use crate::cmac::{Composition, FitOptions, Membership, Network, NetworkOptions, Rows, Scales};
+use crate::cmac::{Composition, FitOptions, LinearRows, Membership, Network, NetworkOptions, Scales};
 
 const COLUMNS: [usize; 2] = [0, 1];
 const SCALES: Scales = Scales { noise: 2e-5, roughness: 1e-4, level: 1e-3 };
@@ -30,8 +30,14 @@ impl Measured {
         Self { inputs, jacobian, residual }
     }
 
-    fn rows(&self) -> Rows<'_> {
-        Rows { inputs: &self.inputs, jacobian: &self.jacobian, residual: &self.residual, columns: &COLUMNS }
+    fn rows(&self) -> LinearRows<'_> {
+        LinearRows {
+            inputs: &self.inputs,
+            jacobian: &self.jacobian,
+            residual: &self.residual,
+            columns: &COLUMNS,
+            targets: 1,
+        }
     }
 }
 
@@ -143,6 +149,6 @@ fn what_cannot_be_fitted_is_refused() {
     let options = FitOptions { scales, ..FitOptions::default() };
     let refused = network(&[8, 8], 3, 2, GAUSSIAN).fit(&measured.rows(), &options);
     assert!(refused.unwrap_err().to_string().contains("the noise is 0"));
-    let short = Rows { residual: &measured.residual[..119], ..measured.rows() };
+    let short = LinearRows { residual: &measured.residual[..119], ..measured.rows() };
     assert!(network(&[8, 8], 3, 2, GAUSSIAN).fit(&short, &FitOptions::default()).is_err());
 }

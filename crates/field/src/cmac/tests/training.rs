@@ -1,5 +1,5 @@
 use super::{GAUSSIAN, inputs, made, network};
-use crate::cmac::{Composition, NetworkOptions, Rate, Rows, TrainingEnd, TrainingOptions};
+use crate::cmac::{Composition, LinearRows, NetworkOptions, Rate, TrainingEnd, TrainingOptions};
 
 const LENGTHS: [usize; 2] = [1, 2];
 
@@ -38,11 +38,12 @@ fn a_projected_update_meets_its_pattern() {
     let network = network(&[6, 7], 3, 2, GAUSSIAN);
     let wanted = [1e-3, -2e-3];
     let start = network.with_weights(&(0..84).map(|k| f64::from(k) * 1e-4).collect::<Vec<_>>()).unwrap();
-    let rows = Rows {
+    let rows = LinearRows {
         inputs: &[0.1, 0.2],
         jacobian: &[1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         residual: &[1e-3, -2e-3, 0.0],
         columns: &LENGTHS,
+        targets: 1,
     };
     let trained = start.train_on_rows(&rows, &options(Rate::Projected(1.0), 2)).unwrap();
     let mut out = [0.0; 2];
@@ -113,7 +114,8 @@ fn measurements_train_to_the_ceps_that_they_determine() {
             residual.push(row[0] * ceps[0] + row[1] * ceps[1]);
         }
     }
-    let rows = Rows { inputs: &s, jacobian: &jacobian, residual: &residual, columns: &LENGTHS };
+    let rows =
+        LinearRows { inputs: &s, jacobian: &jacobian, residual: &residual, columns: &LENGTHS, targets: 1 };
     let how = TrainingOptions { tolerance: 1e-5, ..options(Rate::Printed(1.0), 3000) };
     let trained = network.train_on_rows(&rows, &how).unwrap();
     let mut out = vec![0.0; 120];
