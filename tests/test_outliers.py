@@ -157,3 +157,18 @@ def test_a_robust_fit_is_advised_where_it_is_none(tmp_path, monkeypatch, capsys,
     words = " ".join(capsys.readouterr().out.split())
     assert said in words
     assert ("--robust cauchy gives" in words) == advised
+
+
+def test_outliers_of_the_training_rows_are_not_forgotten_in_the_fit_to_all():
+    errs = Imperfections(length_mm=0.3, angle_deg=0.03, share=0.3, non_geometric="joint", noise_mm=0.0)
+    errs = replace(errs, noise_mrad=0.0, repeatability_deg=0.004)
+    arm, rng = VirtualArm(ta.Robot.load("ur5"), seed=0, imperfections=errs), np.random.default_rng(5)
+    table, off = arm.measure_table(arm.poses(60, seed=1), seed=1), list(range(3, 45, 7))
+    for pose in off:
+        direction = rng.normal(size=3)
+        table.loc[pose, ["x", "y", "z"]] += 1e-3 * direction / np.linalg.norm(direction)
+    table = table.loc[table.index.repeat(3)].reset_index(drop=True)
+    table[["x", "y", "z"]] += 3e-6 * rng.normal(size=(len(table), 3))
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), threads=1)
+    rows = sorted(entry["row"] for entry in found.summary["outliers"])
+    assert rows == [3 * pose + shot for pose in off for shot in (1, 2, 3)]

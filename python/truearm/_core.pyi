@@ -557,8 +557,8 @@ class Posterior:
         """
 
     def first_shots(self, count: int) -> NDArray[np.uint64]:
-        """For each of the first `count` residuals (n, m), counted row by row, the place of the first one that
-        was averaged with it, (count,); its own where none was.
+        """For each of the first `count` residuals (n, m), counted row by row, the place of the first one of
+        its pose, of whatever shot, (count,); its own where it took no part.
         """
 
     def repeatability(self, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:

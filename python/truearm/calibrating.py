@@ -254,25 +254,29 @@ def _fit_both(
     trained, drift = fit_settled(task, data, train)
     if order is train:
         return trained, drift, trained
-    final = _fit_all(task, trained, drift.taken_out(data).select(order))
+    final = _fit_all(task, trained, (drift.taken_out(data), train, order))
     if final.constant.noise[0] < STUCK * trained.constant.noise[0]:
         trained, drift = fit_settled(_begun_at(task, final), data, train)
-        final = _fit_all(task, trained, drift.taken_out(data).select(order))
+        final = _fit_all(task, trained, (drift.taken_out(data), train, order))
     return trained, drift, final
 
 
-def _fit_all(task: Task, trained: Fits, rows: Measurements) -> Fits:
-    """The fits to all rows; constants are not lost that the training rows found.
+def _fit_all(
+    task: Task, trained: Fits, rows: tuple[Measurements, NDArray[np.int64], NDArray[np.int64]]
+) -> Fits:
+    """The fits to all rows; neither constants nor outliers are lost that the training rows found.
 
-    Hyper-parameters are found again where few rows trained, and not without those that were validated: a
-    search may end at a lesser maximum.
+    `rows` are all rows, which of them trained, and the order of the fit. Hyper-parameters are found again
+    where few rows trained, and not without those that were validated: a search may end at a lesser maximum.
     """
-    known = NOTHING_KNOWN
+    known, (data, train, order) = NOTHING_KNOWN, rows
     if trained.variable is not None and _keeps_hyper(trained):
         known = KnownHyper(trained.variable.hyper)
     elif trained.variable is not None:
-        known = KnownHyper(near=trained.variable, contested=True)
-    return fit_rows(_begun_at(task, trained), rows, known)
+        suspected = np.zeros(len(data), dtype=np.bool_)
+        suspected[train] = trained.variable.weights < 1.0
+        known = KnownHyper(near=trained.variable, contested=True, suspected=suspected[order])
+    return fit_rows(_begun_at(task, trained), data.select(order), known)
 
 
 def _begun_at(task: Task, fits: Fits) -> Task:

@@ -8,7 +8,7 @@
 use faer::{Mat, MatRef};
 use truearm_estimate::dense::{Eigen, Orthogonal, product};
 
-use crate::training::Training;
+use crate::training::{Shot, Training};
 
 /// Motions of a rigid body.
 const MOTIONS: usize = 6;
@@ -28,7 +28,8 @@ pub struct Condensed {
 /// Positions without motion whose noise is alike, of weight one.
 struct Still {
     variance: f64,
-    source: Vec<usize>,
+    source: Vec<Shot>,
+    kept: f64,
     /// Set-up columns and residuals, (N, s + 1) row-major.
     rows: Vec<f64>,
 }
@@ -84,8 +85,7 @@ impl<'a> Building<'a> {
 
     fn are_alike(&self, a: usize, b: usize) -> bool {
         let of = |row: usize| {
-            let shots = self.of.source[row].len();
-            (self.of.is_orientation[row], self.of.variance[row], self.of.weight[row], shots)
+            (self.of.is_orientation[row], self.of.variance[row], self.of.weight[row], self.of.kept(row))
         };
         of(a) == of(b)
     }
@@ -123,11 +123,12 @@ impl<'a> Building<'a> {
 
     /// Rows without motion that have the noise of a row, but for its weight.
     fn still_like(&mut self, row: usize) -> &mut Still {
-        let (variance, source) = (self.of.variance[row], &self.of.source[row]);
-        let alike = |still: &Still| (still.variance, still.source.len()) == (variance, source.len());
+        let (variance, kept) = (self.of.variance[row], self.of.kept(row));
+        let alike = |still: &Still| (still.variance, still.kept) == (variance, kept);
         let place = self.still.iter().position(alike).unwrap_or(self.still.len());
         if place == self.still.len() {
-            self.still.push(Still { variance, source: source.clone(), rows: Vec::new() });
+            let source = self.of.source[row].clone();
+            self.still.push(Still { variance, source, kept, rows: Vec::new() });
         }
         &mut self.still[place]
     }
@@ -177,7 +178,7 @@ impl Training {
         &mut self,
         (jacobian, setup, residual): (&[f64], &[f64], f64),
         variance: f64,
-        source: &[usize],
+        source: &[Shot],
     ) {
         self.jacobian.extend(jacobian);
         self.setup.extend(setup);

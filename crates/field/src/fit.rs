@@ -9,7 +9,7 @@ use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
 use crate::hyper::{Hyper, Wave};
 use crate::joined::{Joined, join};
-use crate::linear::{input_values, training};
+use crate::linear::{input_values, left_by_constants, training};
 use crate::optimise::Limits;
 use crate::options::{Begin, FieldOptions, Start};
 use crate::outliers::{self, Judgement};
@@ -170,7 +170,9 @@ pub fn restore(
 fn rows(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Joined, FieldError> {
     options.check(problem)?;
     let set = problem.measurements;
-    let joined = join(training(problem, point, options)?, &set.group, set.rows_per_pose());
+    let training = training(problem, point, options)?;
+    let left = left_by_constants(problem, point, &training);
+    let joined = join(training, &left, &set.group, set.rows_per_pose());
     if joined.training.row_count() == 0 {
         let rule = "a field needs some: give positions or orientations whose weights are not zero";
         return Err(FieldError::Option { what: "the number of measured values", value: 0, rule });

@@ -3,19 +3,20 @@
 //! Shots at an arm that stands still share what it did not repeat and what no field holds: between them is the noise of a
 //! shot alone. As rows of their own they would say that all the rest is the field's, which would follow every pose and
 //! mislead between them. The likelihood of n shots falls into that of their mean, of variance `p^2 + s^2 / n` with p of the
-//! pose and s of a shot, and that of their differences, which knows s alone and is left out here.
+//! pose and s of a shot, and that of their differences, which knows s alone and is left out here. Where shots state sigmas,
+//! each counts by `1 / (s^2 + sigma^2)`, and the mean of a target is of those that hold it: this is exact as well.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use truearm_bank::Input;
 
 use crate::outliers::chi_squared;
-use crate::training::Training;
+use crate::training::{Shot, Training};
 
 /// Joint values that differ by less, rad or m, are one pose: far less than the shortest length scale, more than what
 /// readings of an arm that stands still scatter.
 const STILL: f64 = 3e-4;
-/// The same of features, whose range is pi: a thousandth of it.
-const ALIKE: f64 = 3e-3;
+/// The same of features, whose range is pi: a twentieth of it. They may be read at each shot, and scatter; the mean has theirs.
+const ALIKE: f64 = 0.05 * std::f64::consts::PI;
 /// Typical deviations from the median of a pose's shots from which on one stands apart, to be judged as a row of its own.
 const FAR: f64 = 10.0;
 /// Least deviation that is taken for typical, m or rad: that of an instrument's last digit.
@@ -24,6 +25,8 @@ const LAST_DIGIT: f64 = 1e-5;
 const ENOUGH: f64 = 9.0;
 /// Rows of a position, and of an orientation.
 const COORDINATES: f64 = 3.0;
+/// Sums of shares that differ by less are the same.
+const ROUNDING: f64 = 1e-9;
 
 /// Rows with one pose for all of its shots.
 pub struct Joined {
@@ -34,9 +37,10 @@ pub struct Joined {
     pub doubtful: Vec<usize>,
 }
 
-/// Joins the shots of each pose; `group` (n,) tells set-ups apart, each pose has a place for `rows_per_pose` residuals.
-pub fn join(training: Training, group: &[usize], rows_per_pose: usize) -> Joined {
-    let shots = Shots { training: &training, group, rows_per_pose };
+/// Joins the shots of each pose; constants leave `left` (R,) of its rows, `group` (n,) tells set-ups apart, each pose has a
+/// place for `rows_per_pose` residuals.
+pub fn join(training: Training, left: &[f64], group: &[usize], rows_per_pose: usize) -> Joined {
+    let shots = Shots { training: &training, left, group, rows_per_pose };
     let mut poses = shots.poses();
     if poses.len() == training.pose_count() {
         let pose_of = (0..poses.len()).collect();
@@ -91,6 +95,7 @@ fn widest(joints: &[&[f64]]) -> usize {
 /// What may be several shots of the same pose.
 struct Shots<'a> {
     training: &'a Training,
+    left: &'a [f64],
     group: &'a [usize],
     rows_per_pose: usize,
 }
@@ -110,56 +115,62 @@ impl Shots<'_> {
         let joints = training.geometry.joint_count();
         let are_alike = |((input, x), y): ((&Input, &f64), &f64)| (input.scale * (x - y)).abs() <= ALIKE;
         let inputs = training.inputs.iter().zip(training.values_of(a)).zip(training.values_of(b));
-        let sigmas = |pose: usize| &training.variance[training.rows(pose)];
-        let places = |pose: usize| {
-            training.rows(pose).map(move |row| training.source[row][0] - pose * self.rows_per_pose)
-        };
-        let weight = |pose: usize| training.rows(pose).next().map(|row| training.weight[row]);
+        let is_measured = |shot: usize| !training.rows(shot).is_empty();
         self.group[a] == self.group[b]
             && inputs.skip(joints).all(are_alike)
-            && sigmas(a) == sigmas(b)
-            && weight(a).is_some()
-            && weight(a) == weight(b)
-            && places(a).eq(places(b))
+            && is_measured(a)
+            && is_measured(b)
     }
 
-    /// Squares of a shot's deviations from `centre`, a value a row, of positions and of orientations.
-    fn squares(&self, shot: usize, centre: &[f64]) -> [f64; 2] {
-        let mut squares = [0.0; 2];
-        for (row, centre) in self.training.rows(shot).zip(centre) {
-            let kind = usize::from(self.training.is_orientation[row]);
-            squares[kind] += (self.training.residual[row] - centre).powi(2);
+    /// Rows of a pose's shots: of each target's coordinate, and of the orientation's, those of all shots that hold it.
+    fn rows_of(&self, members: &[usize]) -> Vec<Vec<usize>> {
+        let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for row in members.iter().flat_map(|&member| self.training.rows(member)) {
+            rows.entry(self.place(row) % self.rows_per_pose).or_default().push(row);
         }
-        squares
+        rows.into_values().collect()
     }
 
-    /// What `of` makes of the values of each row of a pose.
-    fn centre(&self, members: &[usize], of: impl Fn(&mut [f64]) -> f64) -> Vec<f64> {
-        let rows = self.training.rows(members[0]).len();
-        let at = |member: usize, row: usize| self.training.residual[self.training.rows(member).start + row];
-        (0..rows)
-            .map(|row| of(&mut members.iter().map(|&member| at(member, row)).collect::<Vec<f64>>()))
-            .collect()
+    fn place(&self, row: usize) -> usize {
+        self.training.source[row][0].place
+    }
+
+    fn shot(&self, row: usize) -> usize {
+        self.place(row) / self.rows_per_pose
+    }
+
+    fn kind(&self, row: usize) -> usize {
+        usize::from(self.training.is_orientation[row])
+    }
+
+    /// Rows of the same quantity with their shares of its mean, where shots differ by variances beside those they state.
+    fn shared(&self, rows: &[usize], variance: [f64; 2]) -> Shared {
+        let of = |&row: &usize| {
+            1.0 / (self.training.variance[row] + variance[self.kind(row)].max(LAST_DIGIT * LAST_DIGIT))
+        };
+        let weights: Vec<f64> = rows.iter().map(of).collect();
+        let whole: f64 = weights.iter().sum();
+        let shares = weights.iter().map(|weight| weight / whole).collect();
+        let values = rows.iter().map(|&row| self.training.residual[row]).collect();
+        Shared { values, weights, shares }
     }
 
     /// Makes poses of their own of shots that stand apart; gives those that most others of their pose contradict.
     fn set_apart(&self, poses: &mut Vec<Vec<usize>>) -> Vec<usize> {
-        let mut squares = vec![[0.0; 2]; self.training.pose_count()];
-        let mut all: [Vec<f64>; 2] = Default::default();
-        for members in poses.iter().filter(|members| members.len() > 1) {
-            let centre = self.centre(members, median);
-            let freedom = (members.len() - 1) as f64 / members.len() as f64;
-            for &shot in members {
-                squares[shot] = self.squares(shot, &centre).map(|square| square / freedom);
-                all.iter_mut().zip(squares[shot]).for_each(|(all, square)| all.push(square));
-            }
-        }
-        let left = self.left();
-        let typical =
-            [0, 1].map(|kind| median(&mut all[kind]).min(left[kind]) / chi_squared(COORDINATES, 0.0));
-        let typical = typical.map(|typical| typical.max(LAST_DIGIT * LAST_DIGIT));
-        let limit = typical.map(|typical| FAR * FAR * COORDINATES * typical);
-        let is_far = |shot: &usize| squares[*shot].iter().zip(limit).any(|(square, limit)| *square > limit);
+        let squares = self.squares(poses);
+        let left = self.squares_left();
+        let typical = [0, 1].map(|kind| {
+            let share = |squares: &[Mean]| median(squares.iter().filter_map(Mean::value).collect());
+            share(&squares[kind]).min(share(&left[kind])) * COORDINATES / chi_squared(COORDINATES, 0.0)
+        });
+        let is_far = |&shot: &usize| {
+            (0..2).any(|kind| {
+                let least = LAST_DIGIT * LAST_DIGIT / self.stated(shot, kind);
+                squares[kind][shot]
+                    .value()
+                    .is_some_and(|square| square > FAR * FAR * typical[kind].max(least))
+            })
+        };
         let (mut kept, mut doubted) = (Vec::new(), Vec::new());
         for members in poses.drain(..) {
             let (far, near): (Vec<usize>, Vec<usize>) = members.into_iter().partition(is_far);
@@ -173,68 +184,154 @@ impl Shots<'_> {
         doubted
     }
 
-    /// Typical square of what the constants leave of positions and of orientations: shots of a pose do not differ by more, and
-    /// where there are few of them, those that do are all there is.
-    fn left(&self) -> [f64; 2] {
-        let mut all: [Vec<f64>; 2] = Default::default();
-        for shot in 0..self.training.pose_count() {
-            let squares = self.squares(shot, &vec![0.0; self.training.rows(shot).len()]);
-            let present = all.iter_mut().zip(squares).filter(|(_, square)| *square > 0.0);
-            present.for_each(|(all, square)| all.push(square));
-        }
-        all.map(|mut all| median(&mut all))
+    /// Variance that a shot's positions or orientations state, with that of an instrument's last digit.
+    fn stated(&self, shot: usize, kind: usize) -> f64 {
+        let row = self.training.rows(shot).find(|&row| self.kind(row) == kind);
+        row.map_or(0.0, |row| self.training.variance[row]) + LAST_DIGIT * LAST_DIGIT
     }
 
-    /// Variance of a shot beside its own, of positions and of orientations: what it is at least, in all likelihood, so that
-    /// a few that happen to differ do not vouch for the noise of all.
-    fn variance(&self, poses: &[Vec<usize>]) -> [f64; 2] {
-        let (mut sums, mut freedom, mut own) = ([0.0; 2], [0.0; 2], [0.0; 2]);
-        for members in poses.iter().filter(|members| members.len() > 1) {
-            let centre = self.centre(members, mean);
-            let more = (members.len() - 1) as f64;
-            for &shot in members {
-                let squares = self.squares(shot, &centre);
-                (0..2).for_each(|kind| sums[kind] += squares[kind]);
-            }
-            for row in self.training.rows(members[0]) {
-                let kind = usize::from(self.training.is_orientation[row]);
-                freedom[kind] += more;
-                own[kind] += more * self.training.variance[row];
+    /// Squares of each shot's deviations from its pose's median, over what it states, of positions and of orientations.
+    fn squares(&self, poses: &[Vec<usize>]) -> [Vec<Mean>; 2] {
+        let mut squares = [0, 1].map(|_| vec![Mean::default(); self.training.pose_count()]);
+        let several =
+            poses.iter().filter(|members| members.len() > 1).flat_map(|members| self.rows_of(members));
+        for rows in several.filter(|rows| rows.len() > 1) {
+            let shared = self.shared(&rows, [0.0; 2]);
+            let centre = shared.median();
+            for (k, &row) in rows.iter().enumerate() {
+                let square = shared.weights[k] * (shared.values[k] - centre).powi(2);
+                squares[self.kind(row)][self.shot(row)].add(square / (1.0 - shared.shares[k]));
             }
         }
+        squares
+    }
+
+    /// The same of what the constants leave: shots of a pose do not differ by more, and where there are few of them, those
+    /// that do are all there is.
+    fn squares_left(&self) -> [Vec<Mean>; 2] {
+        let mut squares = [0, 1].map(|_| vec![Mean::default(); self.training.pose_count()]);
+        for (row, left) in self.left.iter().enumerate() {
+            let (shot, kind) = (self.shot(row), self.kind(row));
+            squares[kind][shot].add(left * left / self.stated(shot, kind));
+        }
+        squares
+    }
+
+    /// Variance of a shot beside its own, of positions and of orientations, from squares of differences (DerSimonian and
+    /// Laird 1986): what it is at least, in all likelihood, so that a few that happen to differ do not vouch for the noise
+    /// of all.
+    fn variance(&self, poses: &[Vec<usize>]) -> [f64; 2] {
+        let (mut excess, mut gain, mut freedom) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let several =
+            poses.iter().filter(|members| members.len() > 1).flat_map(|members| self.rows_of(members));
+        for rows in several.filter(|rows| rows.len() > 1) {
+            let (kind, shared) = (self.kind(rows[0]), self.shared(&rows, [0.0; 2]));
+            let centre = shared.mean();
+            for (k, &row) in rows.iter().enumerate() {
+                let (weight, free) = (shared.weights[k], 1.0 - shared.shares[k]);
+                let square = (shared.values[k] - centre).powi(2);
+                excess[kind] += weight * (square - free * self.training.variance[row]);
+                gain[kind] += weight * free;
+            }
+            freedom[kind] += (rows.len() - 1) as f64;
+        }
         let least = |kind: usize| {
-            let most: f64 = freedom[kind] + 2.0 * f64::sqrt(2.0 * freedom[kind]);
-            if freedom[kind] < ENOUGH { 0.0 } else { ((sums[kind] - own[kind]) / most).max(0.0) }
+            let most: f64 = 1.0 + 2.0 * f64::sqrt(2.0 / freedom[kind]);
+            if freedom[kind] < ENOUGH { 0.0 } else { (excess[kind] / (gain[kind] * most)).max(0.0) }
         };
         [least(0), least(1)]
     }
 
-    /// One pose with the mean of the residuals for each of `poses`.
+    /// One pose with the mean of the residuals for each of `poses`, and the least of the weights.
     fn means(&self, poses: &[Vec<usize>]) -> Training {
         let old = self.training;
+        let rows: Vec<Vec<Vec<usize>>> = poses.iter().map(|members| self.rows_of(members)).collect();
         let firsts: Vec<usize> = poses.iter().map(|members| members[0]).collect();
-        let mut joined = old.select(&firsts);
+        let of_firsts = |rows: &Vec<Vec<usize>>| rows.iter().map(|shots| shots[0]).collect();
+        let mut joined = old.with_rows(&firsts, &rows.iter().map(of_firsts).collect::<Vec<Vec<usize>>>());
         joined.shot = self.variance(poses);
         for (pose, members) in poses.iter().enumerate().filter(|(_, members)| members.len() > 1) {
-            let centre = self.centre(members, mean);
-            for (k, row) in joined.rows(pose).enumerate() {
-                let of = |member: &usize| old.rows(*member).start + k;
-                let own: f64 = members.iter().map(|member| old.variance[of(member)]).sum();
-                joined.residual[row] = centre[k];
-                joined.variance[row] = own / (members.len() * members.len()) as f64;
+            let weight =
+                rows[pose].iter().flatten().map(|&row| old.weight[row]).fold(f64::INFINITY, f64::min);
+            for (shots, row) in rows[pose].iter().zip(joined.rows(pose)) {
+                let shared = self.shared(shots, joined.shot);
+                let own =
+                    shared.shares.iter().zip(shots).map(|(share, &shot)| share * share * old.variance[shot]);
+                joined.variance[row] = own.sum();
+                joined.residual[row] = shared.mean();
+                joined.weight[row] = weight;
+                let source = shared.shares.iter().zip(shots);
                 joined.source[row] =
-                    members.iter().flat_map(|member| old.source[of(member)].clone()).collect();
+                    source.map(|(&share, &shot)| Shot { place: self.place(shot), share }).collect();
             }
+            self.average_features(&mut joined, pose, members);
         }
         joined
     }
+
+    /// Gives a pose the mean of its shots' features.
+    fn average_features(&self, joined: &mut Training, pose: usize, members: &[usize]) {
+        let (joints, inputs) = (joined.geometry.joint_count(), joined.inputs.len());
+        if inputs == joints {
+            return;
+        }
+        for input in joints..inputs {
+            let sum: f64 = members.iter().map(|&member| self.training.values_of(member)[input]).sum();
+            joined.values[pose * inputs + input] = sum / members.len() as f64;
+        }
+        let levers = joined.geometry.at(joined.values_of(pose));
+        let count = joined.geometry.len();
+        joined.levers[pose * count..][..count].copy_from_slice(&levers);
+    }
 }
 
-fn mean(values: &mut [f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+/// Values of the same quantity (k,) from shots of a pose, weights that are inverse variances, and their shares of the mean.
+struct Shared {
+    values: Vec<f64>,
+    weights: Vec<f64>,
+    shares: Vec<f64>,
 }
 
-fn median(values: &mut [f64]) -> f64 {
+impl Shared {
+    fn mean(&self) -> f64 {
+        self.values.iter().zip(&self.shares).map(|(value, share)| value * share).sum()
+    }
+
+    /// Half of the shares lie below it, half above.
+    fn median(&self) -> f64 {
+        let mut order: Vec<usize> = (0..self.values.len()).collect();
+        order.sort_by(|&a, &b| self.values[a].total_cmp(&self.values[b]));
+        let from = |least: f64| {
+            let mut sum = 0.0;
+            let reached = order.iter().find(|&&k| {
+                sum += self.shares[k];
+                sum > least
+            });
+            self.values[*reached.unwrap_or(&order[order.len() - 1])]
+        };
+        0.5 * (from(0.5 - ROUNDING) + from(0.5 + ROUNDING))
+    }
+}
+
+/// A mean of values that come one after the other.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    fn value(&self) -> Option<f64> {
+        (self.count > 0.0).then(|| self.sum / self.count)
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

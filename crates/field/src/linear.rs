@@ -5,7 +5,7 @@ use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_prec
 
 use crate::FieldError;
 use crate::options::FieldOptions;
-use crate::training::{Column, Training};
+use crate::training::{Column, Shot, Training};
 
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.
 ///
@@ -70,12 +70,7 @@ fn push_row(
     let layout = Layout::new(problem);
     let at = pose * linear.rows + row;
     let jacobian = &linear.arm[at * layout.arm..(at + 1) * layout.arm];
-    let known: f64 = jacobian
-        .iter()
-        .zip(&training.columns)
-        .filter(|(_, column)| column.constant > 0.0)
-        .map(|(entry, column)| entry * (point.parameters[column.parameter] - nominal[column.parameter]))
-        .sum();
+    let known = by_constants(jacobian, &training.columns, nominal, point);
     training.jacobian.extend(jacobian);
     let width = layout.group_width();
     let mut setup = vec![0.0; training.setup_width];
@@ -85,8 +80,27 @@ fn push_row(
     training.residual.push(linear.residual[at] + known);
     training.variance.push(if orientation { 0.0 } else { set.sigma[pose].powi(2) });
     training.weight.push(set.weight[pose]);
-    training.source.push(vec![at]);
+    training.source.push(vec![Shot { place: at, share: 1.0 }]);
     training.is_orientation.push(orientation);
+}
+
+/// What the constants of a point explain of a row's residual from the nominal arm, by its Jacobian (P,).
+fn by_constants(jacobian: &[f64], columns: &[Column], nominal: &[f64], point: Point) -> f64 {
+    jacobian
+        .iter()
+        .zip(columns)
+        .filter(|(_, column)| column.constant > 0.0)
+        .map(|(entry, column)| entry * (point.parameters[column.parameter] - nominal[column.parameter]))
+        .sum()
+}
+
+/// What the constants of a point leave of the residuals of rows linearised there, (R,).
+pub fn left_by_constants(problem: &Problem, point: Point, training: &Training) -> Vec<f64> {
+    let nominal = problem.chain.nominal();
+    let left = |(row, residual): (usize, &f64)| {
+        residual - by_constants(training.jacobian_row(row), &training.columns, &nominal, point)
+    };
+    training.residual.iter().enumerate().map(left).collect()
 }
 
 fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {

@@ -5,7 +5,7 @@ use truearm_estimate::{Layout, Point, Problem, Setup, residuals};
 
 use crate::FieldError;
 use crate::posterior::{Posterior, Solution};
-use crate::training::Training;
+use crate::training::{Shot, Training};
 
 /// Gauss-Newton steps on the exact model after the linear solution.
 const RELINEARISATIONS: usize = 2;
@@ -34,8 +34,8 @@ pub fn relinearised(
     let mut refined = apply(problem, point, posterior, values, &solution)?;
     for _ in 0..RELINEARISATIONS {
         let explained = explained(posterior.training(), &solution)?;
-        let left = |shots: &Vec<usize>| {
-            shots.iter().map(|&at| refined.residuals[at]).sum::<f64>() / shots.len() as f64
+        let left = |shots: &Vec<Shot>| {
+            shots.iter().map(|shot| shot.share * refined.residuals[shot.place]).sum::<f64>()
         };
         let source = posterior.training().source.iter();
         let linear: Vec<f64> = source.zip(&explained).map(|(shots, part)| left(shots) + part).collect();

@@ -54,6 +54,15 @@ pub struct Column {
     pub own: Option<usize>,
 }
 
+/// A measured value, and its share of the mean that a row holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shot {
+    /// Its place among the residuals (n, m) of all measurements.
+    pub place: usize,
+    /// Shares of a row's shots add up to one.
+    pub share: f64,
+}
+
 /// Rows of `n` poses: `residual = jacobian CEP + setup s + noise`.
 #[derive(Debug, Clone)]
 pub struct Training {
@@ -91,8 +100,8 @@ pub struct Training {
     pub weight: Vec<f64>,
     /// Variance of what shots of a pose differ by, of positions and orientations; zero where all poses have one.
     pub shot: [f64; 2],
-    /// Places of each row among the residuals (n, m) of all measurements, whose mean it is: one for each shot, (R,).
-    pub source: Vec<Vec<usize>>,
+    /// The shots whose mean each row is, (R,).
+    pub source: Vec<Vec<Shot>>,
     /// Whether a row is an orientation (else a position), (R,).
     pub is_orientation: Vec<bool>,
 }
@@ -133,21 +142,28 @@ impl Training {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
     }
 
-    /// For each of the first `count` residuals the place of the first one that was averaged with it; its own where none
-    /// was.
+    /// For each of the first `count` residuals the place of the first one of its pose, of whatever shot; its own where it
+    /// took no part.
     pub fn first_shots(&self, count: usize) -> Vec<usize> {
         let mut first: Vec<usize> = (0..count).collect();
-        for shots in &self.source {
-            shots.iter().filter(|&&shot| shot < count).for_each(|&shot| first[shot] = shots[0]);
+        for pose in 0..self.pose_count() {
+            let places = || self.source[self.rows(pose)].iter().flatten().map(|shot| shot.place);
+            let Some(least) = places().min() else { continue };
+            places().filter(|&place| place < count).for_each(|place| first[place] = least);
         }
         first
+    }
+
+    /// Part of a single shot's variance that the mean in a row keeps: `1 / n` of n alike.
+    pub fn kept(&self, row: usize) -> f64 {
+        self.source[row].iter().map(|shot| shot.share * shot.share).sum()
     }
 
     /// Variance of a row's noise, given the noise that single shots of positions and orientations have; it is not less than
     /// what the shots of poses differ by.
     pub fn noise_variance(&self, row: usize, noise: [f64; 2]) -> f64 {
         let shot = self.shot[usize::from(self.is_orientation[row])];
-        let lost = shot * (1.0 - 1.0 / self.source[row].len() as f64);
+        let lost = shot * (1.0 - self.kept(row));
         let square = noise[usize::from(self.is_orientation[row])].powi(2).max(shot);
         (square - lost + self.variance[row]) / self.weight[row]
     }
@@ -204,11 +220,17 @@ impl Training {
 
     /// The rows of some poses, in the given order.
     pub fn select(&self, poses: &[usize]) -> Training {
-        let rows: Vec<usize> = poses.iter().flat_map(|&pose| self.rows(pose)).collect();
+        let rows: Vec<Vec<usize>> = poses.iter().map(|&pose| self.rows(pose).collect()).collect();
+        self.with_rows(poses, &rows)
+    }
+
+    /// Some poses, in the given order, with these rows each.
+    pub fn with_rows(&self, poses: &[usize], rows: &[Vec<usize>]) -> Training {
         let mut offsets = vec![0];
-        for &pose in poses {
-            offsets.push(offsets[offsets.len() - 1] + self.rows(pose).len());
+        for rows in rows {
+            offsets.push(offsets[offsets.len() - 1] + rows.len());
         }
+        let rows = rows.concat();
         let take = |values: &[f64], width: usize| -> Vec<f64> {
             rows.iter().flat_map(|&row| &values[row * width..(row + 1) * width]).copied().collect()
         };

@@ -431,7 +431,7 @@ impl Posterior {
         vector(py, &self.core().training().shot)
     }
 
-    /// For each of the first `count` residuals the place of the first one that was averaged with it, see the stub.
+    /// For each of the first `count` residuals the place of the first one of its pose, see the stub.
     fn first_shots<'py>(&self, py: Python<'py>, count: usize) -> Bound<'py, PyArray1<usize>> {
         self.core().training().first_shots(count).into_pyarray(py)
     }

@@ -12,7 +12,7 @@ from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.measured_parts import held_parts
 from truearm.rows.evenly import some_rows
 from truearm.rows.shots import Scatter
-from truearm.rows.visits import means, pose_numbers, visits_of
+from truearm.rows.visits import fitted_poses, means, pose_numbers, visits_of
 from truearm.types import AXES, Floats, Mask, Rows
 
 MOST_VALUES: Final = 900
@@ -30,7 +30,8 @@ class Visits:
     """Visits to poses, v of them, each with the mean of its shots.
 
     Rows of one pose and set-up, whenever they were measured, took part in the fit as their mean: they share
-    what the fit takes for noise of the pose.
+    what the fit takes for noise of the pose. Of a pose whose rows hold different points those are looked at
+    that hold as many as any, and the same.
 
     Attributes:
         rows: Place of the first row of each among the fitted rows (v,).
@@ -40,7 +41,7 @@ class Visits:
         count: How many shots it has (v,).
         of_pose: How many its pose has (v,).
         weight: Weight of its rows in the fit (v,).
-        stated: Variance that its rows state (v,), m^2.
+        stated: Variance that rows of its pose state, their mean (v,), m^2.
         own: Variance that the fit took each shot to have of its own beside, m^2.
         targets: Which of the fitted targets are looked at (t,), m = 3 t.
     """
@@ -63,10 +64,11 @@ class Visits:
         targets = np.sort(np.argsort(-parts[trusted].sum(axis=0), kind="stable")[:MOST_TARGETS])
         held = np.repeat(parts[:, targets], AXES, axis=1)
         left = np.where(held, fitted.residual[:, columns_of(targets)], 0.0)
-        pose, stated = _poses(found, fitted), np.square(fitted.data.stated_sigma_m)
+        pose = _poses(found, fitted)
+        stated = means(np.square(fitted.data.stated_sigma_m), pose)[pose]
         _, group = np.unique(fitted.data.group, return_inverse=True)
         order = np.lexsort((progress, group.reshape(-1)))
-        order = order[(trusted & held.any(axis=1))[order]]
+        order = order[(trusted & held.any(axis=1) & _fullest(held, pose))[order]]
         visits = visits_of(pose[order])
         _, first = np.unique(visits, return_index=True)
         some = some_rows(np.arange(len(first)), max(MOST_VALUES // held.shape[1], 1))
@@ -158,18 +160,19 @@ def columns_of(targets: Rows) -> Rows:
 def _poses(found: Calibration, fitted: FittedRows) -> Rows:
     """Place of the first row of each row's pose (n,), of those rows that the fit took for shots of it.
 
-    Constants are fitted to each row: those of one pose that hold the same points and state the same are its
-    shots.
+    Constants are fitted to each row: those of one pose are its shots.
     """
     if isinstance(found.spread, VariableSpread):
-        count, width = fitted.residual.shape
-        first = found.spread.posterior.first_shots(count * width).reshape(count, width)
-        return np.asarray(first.min(axis=1) // width, dtype=np.int64)
-    data = fitted.data
-    poses = pose_numbers(data.readings, data.group)
-    alike = np.column_stack([poses, held_parts(data, found.selection), data.stated_sigma_m])
-    _, at, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
-    return np.asarray(at[number.reshape(-1)], dtype=np.int64)
+        return fitted_poses(found.spread.posterior, fitted.residual)
+    return pose_numbers(fitted.data.readings, fitted.data.group)
+
+
+def _fullest(held: Mask, pose: Rows) -> Mask:
+    """Which rows (n,) hold (n, m) what the first of those does that hold most of their `pose` (n,)."""
+    fullest_first = np.lexsort((-held.sum(axis=1), pose))
+    _, place = np.unique(pose[fullest_first], return_index=True)
+    _, number = np.unique(pose, return_inverse=True)
+    return np.asarray((held == held[fullest_first[place]][number.reshape(-1)]).all(axis=1))
 
 
 def _own(found: Calibration, left: Floats, pose: Rows, stated: Floats) -> float:

@@ -29,9 +29,9 @@ from truearm.fits.schemes import SCHEMES
 from truearm.inputs import is_payload
 from truearm.kinds import settle
 from truearm.measurements import Measurements
-from truearm.rows.visits import one_row_a_pose
+from truearm.rows.visits import fitted_poses, one_row_a_pose
 from truearm.stages import Stages, no_stages
-from truearm.types import Floats
+from truearm.types import Floats, Mask
 
 if TYPE_CHECKING:
     from truearm._core import ConstantOptions, FieldOptions
@@ -57,7 +57,7 @@ CLEARER: Final = 0.7
 PROMISING: Final = 0.85
 """That ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
 ODDS: Final = 1e-6
-"""That a row is an outlier, before anything is known of it: evidence has to surpass it for each one."""
+"""That a pose is an outlier, before anything is known of it: evidence has to surpass it for each one."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
@@ -73,12 +73,14 @@ class KnownHyper:
         near: A fit to nearly the same rows, at whose the search begins; None to begin from nothing.
         contested: Whether a search from nothing stands against that one, and the more probable wins.
         rough: Whether those of a search on a part of the rows are enough.
+        suspected: Rows (n,) that the fit `near` took for outliers; None where there is no such fit.
     """
 
     exactly: Hyper | None = None
     near: FieldFit | None = None
     contested: bool = False
     rough: bool = False
+    suspected: Mask | None = None
 
 
 NOTHING_KNOWN: Final = KnownHyper()
@@ -207,6 +209,7 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
                 known = replace(known, near=variable, contested=not known.rough)
             constants, variable = _without_outliers(task, data, variable.weights, known)
         if known.exactly is None and not known.rough:
+            constants, variable = _remembered(task, data, (constants, variable), known)
             constants, variable = _unmasked(task, data, (constants, variable))
         seconds[VARIABLE] = time.perf_counter() - began
     nominal, found, constant = constants.nominal, constants.identifiability, constants.constant
@@ -271,6 +274,21 @@ def _without_outliers(
     return constants, _fit_field(task, measured, constants, data, known)
 
 
+def _remembered(
+    task: Task, data: Measurements, fits: tuple[_Constants, FieldFit], known: KnownHyper
+) -> tuple[_Constants, FieldFit]:
+    """The fits, or those that begin as a fit to nearly the same rows ended, if these are the clearer.
+
+    Outliers that it found may be part of what varies in a fit that begins with all rows.
+    """
+    variable, suspected = fits[1], known.suspected
+    if suspected is None or not (suspected & (variable.weights >= 1.0)).any():
+        return fits
+    weights = np.where(suspected, SUSPECTED, 1.0)
+    found = _without_outliers(task, data, weights, known)
+    return found if _is_clearer(found[1], variable, CLEARER) else fits
+
+
 def _unmasked(
     task: Task, data: Measurements, fits: tuple[_Constants, FieldFit]
 ) -> tuple[_Constants, FieldFit]:
@@ -309,13 +327,16 @@ def _is_clearer(found: FieldFit, before: FieldFit, ratio: float) -> bool:
     """Whether a fit without some rows is better by the median of distances, or by evidence.
 
     Evidence counts what outliers cost: they have a noise of their own. Of more rows than hyper-parameters
-    are found from it is of a part.
+    are found from it is of a part. It is of poses, and of other data where a fit took other rows for shots of
+    one.
     """
     if np.median(found.distances) < ratio * np.median(before.distances):
         return True
-    more = int((found.weights < 1.0).sum()) - int((before.weights < 1.0).sum())
-    gain = found.evidence - before.evidence
-    return len(found.weights) <= ENOUGH_FOR_HYPER and gain > -np.log(ODDS) * max(more, 1)
+    poses, former = (fitted_poses(fit.posterior, fit.residuals) for fit in (found, before))
+    if len(poses) > ENOUGH_FOR_HYPER or not np.array_equal(poses, former):
+        return False
+    more = len(np.unique(poses[found.weights < 1.0])) - len(np.unique(poses[before.weights < 1.0]))
+    return found.evidence - before.evidence > -np.log(ODDS) * max(more, 1)
 
 
 def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data: Measurements) -> SchemeFit:

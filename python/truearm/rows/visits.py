@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import same_poses
+from truearm._core import Posterior, same_poses
 from truearm.measurements import Measurements
 from truearm.rows.used_distances import holds_distances
 from truearm.types import Floats, Rows
@@ -51,56 +51,73 @@ def visits_of(poses: Rows) -> Rows:
 
 
 def means(values: Floats, visits: Rows, weight: Floats | None = None) -> Floats:
-    """Weighted mean of the values (n, ...) of each visit's rows, all alike without `weight` (n,)."""
+    """Weighted mean of each value (n, ...) over those of a visit's rows that hold it, NaN where none does.
+
+    All rows count alike without `weight` (n,).
+    """
     given = np.ones(len(visits)) if weight is None else weight
-    sums = np.zeros((visits.max() + 1, *values.shape[1:]))
-    np.add.at(sums, visits, (values.T * given).T)
-    return np.asarray((sums.T / np.bincount(visits, given)).T)
+    held = np.isfinite(values)
+    sums, counts = np.zeros((2, visits.max() + 1, *values.shape[1:]))
+    np.add.at(sums, visits, (np.where(held, values, 0.0).T * given).T)
+    np.add.at(counts, visits, (held.T * given).T)
+    return np.asarray(np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0.0))
 
 
 def one_row_a_visit(data: Measurements) -> Measurements:
-    """The mean of each visit's rows, with the number of its first one; rows with distances stay as they are.
-
-    Visits whose rows do not hold the same points stay as they are as well.
-    """
-    visits = visit_numbers(data.readings, np.char.add(np.char.add(data.sources, "\n"), data.group))
-    seen = _seen(data)
-    _, first = np.unique(visits, return_index=True)
-    if holds_distances(data) or not (seen == seen[first][visits]).all():
+    """The mean of each visit's rows, with the number of its first one; distances stay in rows as they are."""
+    if holds_distances(data):
         return data
-    return _one_row_each(data, visits)
+    return _one_row_each(
+        data, visit_numbers(data.readings, np.char.add(np.char.add(data.sources, "\n"), data.group))
+    )
 
 
 def one_row_a_pose(data: Measurements) -> Measurements:
-    """The mean of the rows of each pose that hold the same points, whenever they were measured."""
-    alike = np.column_stack([pose_numbers(data.readings, data.group), _seen(data)])
-    _, number = np.unique(alike, axis=0, return_inverse=True)
+    """The mean of the rows of each pose, whenever they were measured."""
+    _, number = np.unique(pose_numbers(data.readings, data.group), return_inverse=True)
     return _one_row_each(data, number.reshape(-1).astype(np.int64))
 
 
-def _seen(data: Measurements) -> NDArray[np.bool_]:
-    """Which targets each row holds, and last whether an orientation, if there are any."""
-    return data.seen() if data.orientations is None else np.column_stack([data.seen(), data.oriented])
-
-
 def _one_row_each(data: Measurements, numbers: Rows) -> Measurements:
-    """The mean of the rows of each number (n,) from 0, which hold the same points; else the first of them."""
+    """The mean of the rows of each number (n,) from 0; else the first of them.
+
+    A point is the mean of the rows that hold it. Where all rows state sigmas, each counts by its own.
+    """
     _, first = np.unique(numbers, return_index=True)
     if len(first) == len(data):
         return data
-    orientations = data.orientations
-    if orientations is not None:
-        sign = np.where((orientations * orientations[first][numbers]).sum(axis=1) < 0.0, -1.0, 1.0)
-        mean = means(orientations * sign[:, None], numbers)
-        orientations = mean / np.linalg.norm(mean, axis=1)[:, None]
-    sigma = data.sigma_m
+    sigma, weight = data.sigma_m, None
     if sigma is not None:
-        sigma = np.sqrt(means(np.square(sigma), numbers) / np.bincount(numbers))
-    shown = data.select(first)
+        weight = 1.0 / np.square(sigma) if (sigma > 0.0).all() else np.ones(len(data))
+        squares = np.bincount(numbers, np.square(weight * sigma))
+        sigma = np.sqrt(squares) / np.bincount(numbers, weight)
     return replace(
-        shown,
+        data.select(first),
         readings=means(data.readings, numbers),
-        targets=means(data.targets, numbers),
-        orientations=orientations,
+        targets=means(data.targets, numbers, weight),
+        orientations=_mean_orientations(data, numbers),
         sigma_m=sigma,
     )
+
+
+def _mean_orientations(data: Measurements, numbers: Rows) -> Floats | None:
+    """Mean of the orientations of each number's rows (n,), NaN where none holds one."""
+    if data.orientations is None:
+        return None
+    oriented_first = np.argsort(~data.oriented, kind="stable")
+    _, place = np.unique(numbers[oriented_first], return_index=True)
+    like = data.orientations[oriented_first[place]][numbers]
+    sign = np.where((data.orientations * like).sum(axis=1) < 0.0, -1.0, 1.0)
+    mean = means(data.orientations * sign[:, None], numbers)
+    return np.asarray(mean / np.linalg.norm(mean, axis=1)[:, None])
+
+
+def fitted_poses(posterior: Posterior, residuals: Floats) -> Rows:
+    """Place of the first row of each row's pose (n,), of those that a fit took for shots of it.
+
+    Args:
+        posterior: The fit's.
+        residuals: What it leaves of its rows (n, m).
+    """
+    first = posterior.first_shots(residuals.size).reshape(residuals.shape)
+    return np.asarray(first.min(axis=1) // residuals.shape[1], dtype=np.int64)

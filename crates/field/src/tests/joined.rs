@@ -12,7 +12,8 @@ use crate::training::Training;
 const STILL: f64 = 2e-5;
 
 fn joined(rows: Training, set: &MeasurementSet) -> Joined {
-    join(rows, &set.group, set.rows_per_pose())
+    let left = rows.residual.clone();
+    join(rows, &left, &set.group, set.rows_per_pose())
 }
 
 /// Gives the pose behind one the joint values of that one.
@@ -34,11 +35,11 @@ fn shots_are_joined_to_their_mean() {
         for (k, row) in found.rows(pose).enumerate() {
             let of_shots = (0..4).map(|shot| all.residual[all.rows(4 * pose + shot).start + k]);
             assert!((found.residual[row] - of_shots.sum::<f64>() / 4.0).abs() < 1e-15);
-            assert_eq!(found.source[row].len(), 4);
+            assert!((found.kept(row) - 0.25).abs() < 1e-15);
         }
     }
     let first = found.first_shots(all.row_count() + 1);
-    assert_eq!(first[12..24], (12..24).map(|place| 12 + place % 3).collect::<Vec<usize>>());
+    assert_eq!(first[12..24], [12; 12]);
     assert_eq!(first.last(), Some(&all.row_count()));
     // 30 x 3 x 3 differences know the shots' variance to 9 %; it is the smallest that is still plausible that is taken.
     let share = found.shot[0] / 1e-10;
@@ -142,15 +143,79 @@ fn noise_is_not_less_than_what_shots_differ_by() {
 }
 
 #[test]
-fn shots_of_other_sigmas_and_features_are_rows_of_their_own() {
+fn shots_count_by_what_they_state() {
     let arm = six_axes(Truth::BENDING);
     let mut set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 10);
     set.sigma[1] = 5e-4;
+    (set.sigma[0], set.sigma[2]) = (1e-7, 2e-7);
+    let Joined { training: found, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!(pose_of, (0..90).map(|shot| shot / 3).collect::<Vec<usize>>());
+    let shares: Vec<f64> = found.source[0].iter().map(|shot| shot.share).collect();
+    assert!(shares[1] < 1e-3 && (shares[0] - shares[2]).abs() < 1e-3, "{shares:?}");
+    assert!(found.variance[0] < 1e-12, "{}", found.variance[0]);
+}
+
+#[test]
+fn shots_of_two_instruments_are_told_apart_by_what_they_state() {
+    let arm = six_axes(Truth::BENDING);
+    let (fine, coarse) = (5e-6, 2e-4);
+    let mut set = shots(&Measure { groups: 2, ..Measure::poses(60) }.of(&arm), 3, STILL, fine, 11);
+    let mut turn = 0.0_f64;
+    for shot in 0..180 {
+        let of_camera = set.group[shot] == 1;
+        set.sigma[shot] = if of_camera { coarse } else { fine };
+        for value in set.targets[3 * shot..][..3].iter_mut().filter(|_| of_camera) {
+            turn += 2.4;
+            *value += coarse * turn.sin();
+        }
+    }
+    let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!(pose_of, (0..180).map(|shot| shot / 3).collect::<Vec<usize>>());
+    assert!(training.shot[0] < fine * fine, "{}", training.shot[0]);
+}
+
+#[test]
+fn a_target_is_the_mean_of_the_shots_that_hold_it() {
+    let arm = six_axes(Truth::BENDING);
+    let measure = Measure { orientation: Some(1e-5), ..Measure::poses(20) };
+    let mut set = shots(&measure.of(&arm), 3, 0.0, 1e-5, 12);
+    for pose in 0..20 {
+        set.rotations[9 * (3 * pose)..][..9].fill(f64::NAN);
+        set.targets[3 * (3 * pose + 1)..][..3].fill(f64::NAN);
+    }
+    let all = rows_of(&arm, &set, |_| ());
+    let Joined { training: found, pose_of, .. } = joined(all.clone(), &set);
+    assert_eq!(pose_of, (0..60).map(|shot| shot / 3).collect::<Vec<usize>>());
+    assert_eq!((found.rows(7).len(), found.is_orientation[found.rows(7).start + 3]), (6, true));
+    let mean = |a: usize, b: usize| 0.5 * (all.residual[a] + all.residual[b]);
+    // Shots hold a position, an orientation, and both.
+    let [first, second, third] = [0, 1, 2].map(|shot| all.rows(21 + shot).start);
+    let found_at = |row: usize| found.residual[found.rows(7).start + row];
+    assert!((found_at(0) - mean(first, third)).abs() < 1e-15);
+    assert!((found_at(3) - mean(second, third + 3)).abs() < 1e-15);
+    assert_eq!(found.first_shots(360)[6 * 23..][..6], [6 * 21; 6]);
+}
+
+#[test]
+fn features_of_shots_scatter_and_those_of_other_states_differ() {
+    let arm = six_axes(Truth::BENDING);
+    let set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 10);
     let warm = |options: &mut FieldOptions| {
         options.features = vec![Input::line(10.0)];
         options.feature_values =
-            (0..90).map(|row| if row == 3 { 9.0 } else { 0.002 * (row % 3) as f64 }).collect();
+            (0..90).map(|row| if row == 3 { 9.0 } else { 0.2 * (row % 3) as f64 }).collect();
     };
-    let Joined { pose_of, .. } = joined(rows_of(&arm, &set, warm), &set);
-    assert_eq!(pose_of[..9], [0, 1, 0, 2, 3, 3, 4, 4, 4]);
+    let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, warm), &set);
+    assert_eq!(pose_of[..9], [0, 0, 0, 1, 2, 2, 3, 3, 3]);
+    assert!((training.values_of(0)[6] - 0.2).abs() < 1e-15);
+}
+
+#[test]
+fn a_pose_begins_with_the_least_weight_of_its_shots() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 13);
+    set.weight[4] = 1e-4;
+    let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!(pose_of, (0..90).map(|shot| shot / 3).collect::<Vec<usize>>());
+    assert_eq!((training.weight_of(0), training.weight_of(1)), (Some(1.0), Some(1e-4)));
 }
