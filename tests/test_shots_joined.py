@@ -35,11 +35,13 @@ def shots():
 
 @pytest.fixture(scope="module")
 def fit(shots):
-    """The fit of rows with the hyper-parameters of a rough fit to the shots; and rough."""
+    """The fit of rows with the hyper-parameters of a rough fit to the shots."""
     options = CalibrationOptions()
     task = _task(ARM.robot, shots, options, 1, no_stages)
-    hyper = fit_rows(task, shots, KnownHyper(rough=True)).variable.hyper
-    return lambda data: fit_rows(task, data, KnownHyper(hyper)).variable
+    rough = fit_rows(task, shots, KnownHyper(rough=True)).variable
+    assert rough is not None
+    known = KnownHyper(rough.hyper)
+    return lambda data: fit_rows(task, data, known).variable
 
 
 def differing(shots, how):
