@@ -336,7 +336,7 @@ def _is_clearer(found: FieldFit, before: FieldFit, ratio: float) -> bool:
     if len(poses) > ENOUGH_FOR_HYPER or not np.array_equal(poses, former):
         return False
     more = len(np.unique(poses[found.weights < 1.0])) - len(np.unique(poses[before.weights < 1.0]))
-    return found.evidence - before.evidence > -np.log(ODDS) * max(more, 1)
+    return bool(found.evidence - before.evidence > -np.log(ODDS) * max(more, 1))
 
 
 def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data: Measurements) -> SchemeFit:
