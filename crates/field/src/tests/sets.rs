@@ -61,7 +61,9 @@ pub fn several_shots(poses: usize) -> Training {
     all.sigma.extend(&more.sigma);
     all.weight.extend(&more.weight);
     all.group.extend(&more.group);
-    join(rows_of(&arm, &all, |_| ()), &groups, all.rows_per_pose()).training
+    let rows = rows_of(&arm, &all, |_| ());
+    let left = rows.residual.clone();
+    join(rows, &left, &groups, all.rows_per_pose()).training
 }
 
 /// Four targets and orientations, some not measured, with rows of a sigma and a weight of their own.
