@@ -171,7 +171,8 @@ fn shots_of_two_instruments_are_told_apart_by_what_they_state() {
     }
     let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
     assert_eq!(pose_of, (0..180).map(|shot| shot / 3).collect::<Vec<usize>>());
-    assert!(training.shot[0] < fine * fine, "{}", training.shot[0]);
+    // What readings jitter by moves a target within a metre by less.
+    assert!(training.shot[0] < STILL * STILL, "{}", training.shot[0]);
 }
 
 #[test]
