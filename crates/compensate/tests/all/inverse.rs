@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use crate::common::{Scene, apart, five_axis, readings, seven_axis, six_axis, stream, tool, unbounded};
+use crate::common::{Scene, apart, readings, seven_axis, six_axis, stream, tool};
 use truearm_compensate::{Inverse, Options, Reason, Run, Solved};
 use truearm_kinematics::Transform;
 
