@@ -1,13 +1,17 @@
 """Write docs/explanations/comparison-of-methods.md, and its picture, from a study of accuracy.
 
-truearm study accuracy ROBOT=FILE... -o STUDY
+truearm study accuracy ur10=ur10_ipa_C.csv ur10=ur10_ipa_B.csv abb-irb-120=irb120_faro.csv ur5=ur5_gtpn.csv \\
+  ur10=ur10_ipa_A.csv --split-by goal_x,goal_y,goal_z -o STUDY
 python docs/make_methods.py STUDY
 
-With --section, one section of the page is replaced by what a study of fewer methods gave.
+All single results are kept beside the page, packed: --unpack puts them into STUDY first, and the study
+goes on from there. Size "all" has one seed (--sizes all --seeds 1); --so-far gathers what is there. With
+--section, one section of the page is replaced by what a study of fewer methods gave.
 """
 
 import argparse
 import json
+import lzma
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,6 +20,7 @@ from typing import Any
 
 from truearm.studies.accuracy.methods import TITLES
 from truearm.studies.accuracy.page import sections
+from truearm.studies.accuracy.results import LINES_NAME
 from truearm.studies.accuracy.splits import TITLES as SPLITS
 from truearm.studies.accuracy.summary import LEVEL
 from truearm.studies.markdown import table
@@ -23,12 +28,14 @@ from truearm.studies.markdown import table
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "explanations" / "comparison-of-methods.md"
 PICTURE = PAGE.with_suffix(".svg")
+RESULTS = PAGE.with_suffix(".jsonl.xz")
 FEWEST = 100
 HEAD = """# Comparison of methods
 
 What would other methods have made of the same measurements? `truearm study accuracy ur10=measurements.csv
 -o DIR` answers it for measurements of your own ([options](../reference/cli.md#truearm-study)); this page is
-what it gave on public ones, written by `docs/make_methods.py`.
+what it gave on public ones, written by `docs/make_methods.py`. Every single result is kept beside it
+(`comparison-of-methods.jsonl.xz`).
 
 All methods are given the same positions of one target, the same training poses, 2000 at the most, and are
 judged on the same held-out poses, 1000 at the most. Shots of one visit to a pose are one row.
@@ -94,14 +101,33 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("study", type=Path, help="directory that truearm study accuracy wrote")
     parser.add_argument("--section", metavar="TITLE", help="replace this section of the page alone")
+    parser.add_argument("--unpack", action="store_true", help="only put the kept results into the directory")
     given = parser.parse_args()
-    study = given.study
+    study: Path = given.study
+    if given.unpack:
+        unpack(study)
+        return 0
     summary = json.loads((study / "accuracy.json").read_text())
     if given.section:
         PAGE.write_text(with_section(PAGE.read_text(), summary, given.section))
         sys.stdout.write(f"section replaced in {PAGE}\n")
         return 0
     PICTURE.write_text(leaner((study / "learning_curves.svg").read_text()))
+    RESULTS.write_bytes(lzma.compress((study / LINES_NAME).read_bytes(), preset=9))
+    PAGE.write_text(page_of(summary))
+    sys.stdout.write(f"written to {PAGE}\n")
+    return 0
+
+
+def unpack(study: Path) -> None:
+    """Put the results of the page into a directory that has none."""
+    study.mkdir(parents=True, exist_ok=True)
+    with (study / LINES_NAME).open("xb") as file:
+        file.write(lzma.decompress(RESULTS.read_bytes()))
+
+
+def page_of(summary: Mapping[str, Any]) -> str:
+    """The page that a summary makes."""
     standing, others = parted(sections(summary))
     parts = [
         HEAD,
@@ -114,9 +140,7 @@ def main() -> int:
         *others,
         *list_of_runs(summary),
     ]
-    PAGE.write_text("\n\n".join(part.strip("\n") for part in parts) + "\n")
-    sys.stdout.write(f"written to {PAGE}\n")
-    return 0
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
 def with_section(page: str, summary: Mapping[str, Any], title: str) -> str:

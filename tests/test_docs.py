@@ -9,6 +9,7 @@ once. Blocks of TOML and JSON are read. What is neither says why: ```bash shown:
 
 import importlib.util
 import json
+import lzma
 import os
 import re
 import shlex
@@ -319,6 +320,18 @@ def test_a_leaner_picture_is_the_same_picture():
         '<svg><g><text x="1.23">0.00512</text></g><g clip-path="url(#p)" style="fill: red">\n'
         '<use xlink:href="#m" x="1.23" y="2.5"/>\n<use xlink:href="#m" x="-7" y="2.5"/>\n</g></svg>'
     )
+
+
+def test_kept_results_are_unpacked_for_a_study_that_goes_on(monkeypatch, tmp_path):
+    maker = load_script("make_methods")
+    line = b'{"set": "ur10"}\n'
+    monkeypatch.setattr(maker, "RESULTS", tmp_path / "page.jsonl.xz")
+    maker.RESULTS.write_bytes(lzma.compress(line))
+    monkeypatch.setattr("sys.argv", ["make_methods.py", str(tmp_path / "new" / "study"), "--unpack"])
+    assert maker.main() == 0
+    assert (tmp_path / "new" / "study" / "results.jsonl").read_bytes() == line
+    with pytest.raises(FileExistsError):
+        maker.main()
 
 
 def test_a_section_of_the_comparison_is_replaced_alone(monkeypatch):

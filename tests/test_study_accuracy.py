@@ -64,6 +64,8 @@ def test_a_user_gets_tables_curves_and_results(file, tmp_path, capsys):
     stems = ("learning_curves.png", "learning_curves.svg")
     assert names == {"accuracy.json", "accuracy.md", "results.jsonl", *stems}
     assert printed["asked"] == printed["there"] == 4
+    for kept in map(json.loads, (out / "results.jsonl").read_text().splitlines()):
+        assert all(float(f"{value:.5g}") == value for value in (*kept["errors"].values(), kept["fit_s"]))
     for group in printed["groups"]:
         assert group["methods"]["constant"]["mean_mm"] < group["methods"]["nominal"]["mean_mm"]
     assert "clusters of joint space held out" in (out / "accuracy.md").read_text()

@@ -36,18 +36,27 @@ def also_with_offsets(program: Program) -> dict[int, list[int]]:
 
     All uses of a target have the same tool and work object.
     """
-    moves, found = program.moves, dict[int, list[int]]()
-    uses: dict[int, set[int]] = {}
-    for move in np.flatnonzero(moves.moving).tolist():
-        uses.setdefault(int(moves.target[move]), set()).add(int(moves.environment[move]))
-    suited = {target for target, all_ in uses.items() if len(all_) > 1 and _suited(program, target, all_)}
-    for move in np.flatnonzero(moves.moving & np.isin(moves.target, list(suited))).tolist():
+    moves = program.moves
+    target, environment = moves.target[moves.moving], moves.environment[moves.moving]
+    if (environment == environment[:1]).all():
+        return {}
+    used = np.unique(target * len(program.environments) + environment)
+    targets, environments = np.divmod(used, len(program.environments))
+    first = np.flatnonzero(np.diff(targets, prepend=-1))
+    counts = np.diff(first, append=len(targets))
+    suited = [
+        int(targets[at])
+        for at, count in zip(first[counts > 1].tolist(), counts[counts > 1].tolist(), strict=True)
+        if _suited(program, int(targets[at]), environments[at : at + count].tolist())
+    ]
+    found = dict[int, list[int]]()
+    for move in np.flatnonzero(moves.moving & np.isin(moves.target, suited)).tolist():
         if not program.environments[int(moves.environment[move])].places_as_stored:
             found.setdefault(int(moves.target[move]), []).append(move)
     return found
 
 
-def _suited(program: Program, target: int, environments: set[int]) -> bool:
+def _suited(program: Program, target: int, environments: list[int]) -> bool:
     if target in program.fixed or not of_pose(program.layouts[int(program.targets.layout[target])]):
         return False
     every = [program.environments[number] for number in environments]

@@ -16,6 +16,8 @@ Key = tuple[str, ...]
 LINES_NAME: Final = "results.jsonl"
 MARK: Final = "found_anew_by"
 """In a line: the request to find results anew that it answers."""
+DIGITS: Final = 5
+"""Significant digits of a result's numbers: far more than seeds agree in."""
 KNOWN_BY: Final = ("set", "data", "split", "detail", "size", "seed", "quick", "method")
 
 
@@ -70,7 +72,7 @@ class Kept:
         if self._cut_off:
             self._write()
         with self._path.open("a", encoding="utf-8") as file:
-            for record in records:
+            for record in map(_rounded, records):
                 key = self._put(record, self._request if key_of(record) in self._anew else "")
                 file.write(self._line(key))
                 self._lines += 1
@@ -95,6 +97,14 @@ class Kept:
     def _write(self) -> None:
         write_whole(self._path, "".join(map(self._line, self.records)))
         self._cut_off, self._lines = False, len(self.records)
+
+
+def _rounded(record: Mapping[str, Any]) -> Record:
+    """A result with as many digits as are kept."""
+    found: Record = json.loads(
+        json.dumps(record, allow_nan=False), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")
+    )
+    return found
 
 
 def _request(keys: Iterable[Key]) -> str:
