@@ -16,7 +16,6 @@ from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import Constants, RunTime
 from truearm.programs.urscript_flow import Step
 from truearm.programs.urscript_lines import MOTIONS, STREAMED, TARGETS, Lines, blend_radius
-from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_scopes import Scopes
 from truearm.programs.urscript_syntax import (
     FUNCTIONS,
@@ -25,6 +24,7 @@ from truearm.programs.urscript_syntax import (
     NotReadable,
     Statement,
     Token,
+    argument,
     expression,
     opens_pose,
     statements,
@@ -242,10 +242,10 @@ class Collected:
         if node is not None and word in MOTIONS:
             self._motion(node)
         elif node is not None and word == "set_tcp":
-            self._tcps[node.start] = node.parts[0] if node.parts else None
+            self._tcps[node.start] = argument(node, 0, "pose")
             self._steps.append(Step(node.start, "tcp"))
         elif node is not None and word in PAYLOADS:
-            self._masses[node.start] = node.parts[0] if node.parts else None
+            self._masses[node.start] = argument(node, 0, "m")
             self._steps.append(Step(node.start, "payload"))
         else:
             self._used(statement.tokens, statement.at)

@@ -15,7 +15,7 @@ import numpy as np
 
 from truearm.programs.layouts import RotationVectorPose
 from truearm.programs.urscript_scopes import Scopes
-from truearm.programs.urscript_syntax import Node
+from truearm.programs.urscript_syntax import Node, arguments
 from truearm.rotations import rigid_inverse
 from truearm.types import Transform
 
@@ -220,9 +220,9 @@ class Constants:
         elif node.kind == "operation" and node.text in _ARITHMETIC:
             left, right = (self.number(part, depth + 1) for part in node.parts)
             found = _calculated(lambda: _ARITHMETIC[node.text](left, right))
-        elif node.kind == "call" and node.text in _FUNCTIONS and len(node.parts) == 1:
-            given = self.number(node.parts[0], depth + 1)
-            found = _calculated(lambda: _FUNCTIONS[node.text](given))
+        elif node.kind == "call" and node.text in _FUNCTIONS and (given := arguments(node)) is not None:
+            value = self.number(given[0], depth + 1)
+            found = _calculated(lambda: _FUNCTIONS[node.text](value))
         if not math.isfinite(found):
             raise RunTime("a number is computed when the program runs")
         return found
@@ -247,10 +247,11 @@ class Constants:
             values = np.array([[self.number(part, depth + 1) for part in node.parts]])
             found: Transform = _POSE.to_poses(values)[0]
             return found
-        if node.kind == "call" and node.text == "pose_inv" and len(node.parts) == 1:
-            return rigid_inverse(self.transform(node.parts[0], depth + 1))
-        if node.kind == "call" and node.text in COMBINED and len(node.parts) == 2:
-            first, second = (self.transform(part, depth + 1) for part in node.parts)
+        given = arguments(node) if node.kind == "call" else None
+        if given is not None and node.text == "pose_inv":
+            return rigid_inverse(self.transform(given[0], depth + 1))
+        if given is not None and node.text in COMBINED:
+            first, second = (self.transform(part, depth + 1) for part in given)
             return COMBINED[node.text](first, second)
         raise RunTime("a pose is computed when the program runs")
 

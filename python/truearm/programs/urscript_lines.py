@@ -14,8 +14,8 @@ from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import AXES, RunTime
-from truearm.programs.urscript_places import argument, numbers_of
-from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
+from truearm.programs.urscript_places import numbers_of
+from truearm.programs.urscript_syntax import Node, NotReadable, argument, expression, statements
 from truearm.types import Whole
 
 JOINTS, POSE = 0, 1

@@ -10,12 +10,13 @@ from truearm.programs.lexing import decimals_of
 from truearm.programs.tables import Number
 from truearm.programs.urscript_constants import (
     AXES,
+    COMBINED,
     Constants,
     RunTime,
     moving,
     turning,
 )
-from truearm.programs.urscript_syntax import Node
+from truearm.programs.urscript_syntax import PARAMETERS, Node, argument, arguments
 from truearm.rotations import rigid_inverse
 from truearm.types import Transform
 from truearm.units import RADIANS_PER_DEGREE
@@ -23,6 +24,9 @@ from truearm.units import RADIANS_PER_DEGREE
 _DEEPEST: Final = 20
 _DEEPEST_LEAVES: Final = 120
 _MOST_LEAVES: Final = 200
+_POSE_OF_INVERSE: Final = (0, "x")
+"""Place and name of the pose among the arguments of get_inverse_kin."""
+_OF_INVERSE: Final = frozenset({"", "x", "qnear", "maxPositionError", "maxOrientationError"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +78,7 @@ class Places:
     def note_direct(self, node: Node) -> None:
         """A motion has this target: remember the pose if it goes to it as it is."""
         if node.kind == "call" and node.text == "get_inverse_kin" and node.parts:
-            node = node.parts[0]
+            node = argument(node, *_POSE_OF_INVERSE) or node
         try:
             leaf = self._constants.literal(node)
         except RunTime:
@@ -129,22 +133,29 @@ class Places:
         return True
 
     def _of_call(self, node: Node, depth: int) -> Place:
-        if node.text == "get_forward_kin" and len(node.parts) == 1:
-            place = self.of(node.parts[0], depth)
+        given = arguments(node)
+        if node.text == "get_forward_kin" and given is not None:
+            place = self.of(given[0], depth)
             if not place.is_joints:
                 raise RunTime("get_forward_kin is given no joint angles")
             return place
         if node.text == "get_inverse_kin":
             return self._inverse(node, depth)
-        if node.text in ("pose_trans", "pose_add", "pose_sub") and len(node.parts) == 2:
-            return self._combined(node, depth)
+        if node.text in COMBINED:
+            if given is None:
+                rule = " and ".join(PARAMETERS[node.text])
+                raise RunTime(f"{node.text} is given other arguments than {rule}")
+            return self._combined(node.text, given, depth)
         raise RunTime(f"its target is computed by {node.text or 'a function'} when the program runs")
 
     def _inverse(self, node: Node, depth: int) -> Place:
         """get_inverse_kin(pose, qnear): the pose, with the solution nearest to qnear."""
         if "tcp" in node.keys or len(node.parts) > 4:
             raise RunTime("get_inverse_kin is given a TCP of its own")
-        given = argument(node, 0, "x")
+        unknown = set(node.keys) - _OF_INVERSE
+        if unknown:
+            raise RunTime(f'get_inverse_kin has no argument "{min(unknown)}"')
+        given = argument(node, *_POSE_OF_INVERSE)
         if given is None:
             raise RunTime("get_inverse_kin is given no pose")
         near = argument(node, 1, "qnear")
@@ -158,20 +169,20 @@ class Places:
             raise RunTime("qnear is no list of joint angles")
         return replace(place, seed=seed)
 
-    def _combined(self, node: Node, depth: int) -> Place:
+    def _combined(self, function: str, given: tuple[Node, ...], depth: int) -> Place:
         """A pose times, plus or minus another one.
 
         One of them is the target, the other is constant. Of pose_trans(a, b) the target is b, unless some
         motion goes to a itself: then b is an offset from it. Of pose_add and pose_sub it is a.
         """
-        first, second = node.parts
+        first, second = given
         known = self._constants
-        if node.text == "pose_trans" and not self.leaves(first) & self.direct:
+        if function == "pose_trans" and not self.leaves(first) & self.direct:
             return self.of(second, depth).moved(known.transform(first), np.eye(4), self.leaves(first))
         place, fixed = self.of(first, depth), known.transform(second)
-        if node.text == "pose_trans":
+        if function == "pose_trans":
             return place.moved(np.eye(4), fixed, self.leaves(second))
-        if node.text == "pose_add":
+        if function == "pose_add":
             return place.moved(moving(fixed), turning(fixed), self.leaves(second))
         return place.moved(moving(fixed, -1.0), turning(rigid_inverse(fixed)), self.leaves(second))
 
@@ -203,14 +214,6 @@ class Places:
         return found
 
 
-def argument(call: Node, position: int, name: str) -> Node | None:
-    """The argument of that name, or at that position; None if it is not given."""
-    for place, (key, part) in enumerate(zip(call.keys, call.parts, strict=True)):
-        if key == name or (not key and place == position):
-            return part
-    return None
-
-
 def numbers_of(leaf: Node) -> list[Number]:
     """The six numbers of a place; d2r( ) of a number is one.
 
@@ -222,8 +225,9 @@ def numbers_of(leaf: Node) -> list[Number]:
 
 def _number(node: Node, place: int) -> Number:
     factor = 1.0
-    if node.kind == "call" and node.text == "d2r" and len(node.parts) == 1:
-        node, factor = node.parts[0], RADIANS_PER_DEGREE
+    given = arguments(node) if node.kind == "call" and node.text == "d2r" else None
+    if given is not None:
+        node, factor = given[0], RADIANS_PER_DEGREE
     if node.kind != "number":
         raise RunTime(f"number {place} of it is written as an expression")
     value = float(node.text)

@@ -13,8 +13,7 @@ from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.stepping import lines_before, target_of, written
 from truearm.programs.urscript_lines import STREAMED, blend_radius
-from truearm.programs.urscript_places import argument
-from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
+from truearm.programs.urscript_syntax import Node, NotReadable, argument, expression, statements
 from truearm.units import RADIANS_PER_DEGREE
 
 FILLED: Final = 0.9

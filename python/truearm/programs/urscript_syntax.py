@@ -35,6 +35,19 @@ _PRECEDENCE: Final = {
     "+": 4, "-": 4, "*": 5, "/": 5, "%": 5, "^": 6,
 }  # fmt: skip
 _BINDING_OF_SIGN: Final = 6
+PARAMETERS: Final = {
+    "pose_trans": ("p_from", "p_from_to"),
+    "pose_add": ("p_1", "p_2"),
+    "pose_sub": ("p_to", "p_from"),
+    "pose_inv": ("p_from",),
+    "get_forward_kin": ("q",),
+    "d2r": ("d",),
+    "r2d": ("r",),
+    "sqrt": ("f",),
+    "sin": ("f",),
+    "cos": ("f",),
+}
+"""Names of the arguments of functions in their order (Script Manual); of get_forward_kin without the TCP."""
 
 
 class Token(NamedTuple):
@@ -152,6 +165,26 @@ def expression(tokens: Sequence[Token]) -> Node:
     node = parser.expression(0)
     parser.finish()
     return node
+
+
+def argument(call: Node, position: int, name: str) -> Node | None:
+    """The argument of that name, or at that position; None if it is not given."""
+    for place, (key, part) in enumerate(zip(call.keys, call.parts, strict=True)):
+        if key == name or (not key and place == position):
+            return part
+    return None
+
+
+def arguments(call: Node) -> tuple[Node, ...] | None:
+    """The arguments of a call in the order of its function's parameters, whether by place or by name.
+
+    None if they are not each given once, or others are, or for a function that is not known.
+    """
+    names = PARAMETERS.get(call.text, ())
+    found = [argument(call, position, name) for position, name in enumerate(names)]
+    given = tuple(part for part in found if part is not None)
+    each_once = len({part.start for part in given}) == len(given) == len(names) == len(call.parts)
+    return given if names and each_once else None
 
 
 def opens_pose(tokens: Sequence[Token], place: int) -> bool:

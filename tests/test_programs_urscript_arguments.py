@@ -1,0 +1,74 @@
+"""Arguments of URScript's functions: by place or by name."""
+
+import numpy as np
+import pytest
+
+from tests.program_tools import names_changed, reasons, rewritten, says
+from tests.test_programs_urscript import PATH, SHIFT, UR, pose_text
+from truearm.programs.tables import Motion
+from truearm.robot import Robot
+
+FRAME = "p[0.05, 0.02, 0, 0, 0, 0.1]"
+START = f"set_tcp(p[0, 0, 0.1203, 0, 0, 0])\nmovej({PATH[0].tolist()})\n"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return Robot.load("ur10e")
+
+
+NAMED = [
+    "pose_trans(p_from_to={framed}, p_from={FRAME})",
+    "pose_trans(pose_inv(p_from=pose_inv({FRAME})), p_from_to={framed})",
+    "pose_add(p_2=p[0, 0, 0.01, 0, 0, 0], p_1={lower})",
+    "pose_sub(p_from=p[0, 0, sqrt(f=0.0001), 0, 0, 0], p_to={higher})",
+    "get_inverse_kin(qnear={near}, x={plain})",
+]
+
+
+@pytest.mark.parametrize("target", NAMED)
+def test_arguments_by_name_may_come_in_any_order(robot, target):
+    plain = pose_text(robot, PATH[1])
+    x, y, z, *turn = plain.split(", ")
+    places = {
+        "framed": pose_text(robot, PATH[1], feature=np.array([0.05, 0.02, 0.0, 0.0, 0.0, 0.1])),
+        "lower": ", ".join([x, y, f"{float(z) - 0.01:.9f}", *turn]),
+        "higher": ", ".join([x, y, f"{float(z) + 0.01:.9f}", *turn]),
+        "plain": plain,
+    }
+    written = {name: f"p[{numbers}]" for name, numbers in places.items()}
+    text = START + f"movel({target.format(FRAME=FRAME, near=PATH[1].tolist(), **written)})\n"
+    result = rewritten(UR, text, robot, by=SHIFT)
+    assert reasons(result) == []
+    (moved,) = result.program.moves.target[result.program.moves.motion == Motion.LINEAR]
+    assert np.abs(result.nominal[moved] - PATH[1]).max() < 1e-7
+    assert np.abs(says(UR, result.contents[0], robot)[moved] - PATH[1] - SHIFT).max() < 1e-6
+
+
+OTHERS = {
+    "pose_trans(p_from=p[{0}], p_to=p[{1}])": "pose_trans is given other arguments than p_from and p_from_to",
+    "pose_add(p_2=p[{0}], p[{1}])": "pose_add is given other arguments than p_1 and p_2",
+    "pose_sub(p[{0}])": "pose_sub is given other arguments than p_to and p_from",
+    "get_inverse_kin(p[{0}], near=[0, 0, 0, 0, 0, 0])": 'get_inverse_kin has no argument "near"',
+    "get_forward_kin(tcp=p[{0}])": "its target is computed by get_forward_kin when the program runs",
+}
+
+
+@pytest.mark.parametrize("target", OTHERS)
+def test_a_target_of_other_arguments_is_listed(robot, target):
+    places = [pose_text(robot, q) for q in PATH[:2]]
+    result = rewritten(UR, START + f"movel({target.format(*places)})\n", robot, by=SHIFT)
+    assert names_changed(result) == [2]
+    assert [reason for _, _, reason in reasons(result)] == [OTHERS[target]]
+
+
+def test_tcp_and_payload_are_read_by_name(robot):
+    text = (
+        'set_tcp(tcp_name="grip", pose=p[0, 0, 0.1203, 0, 0, 0])\n'
+        "set_target_payload(cog=[0, 0, 0.05], m=1.25)\n"
+        f"movej({PATH[0].tolist()})\nmovel(p[{pose_text(robot, PATH[1])}])\n"
+    )
+    result = rewritten(UR, text, robot, by=SHIFT)
+    assert result.changed.all()
+    assert np.abs(result.nominal - PATH[:2]).max() < 1e-7
+    assert {one.payload_kg for one in result.program.environments} == {1.25}
