@@ -1,11 +1,14 @@
-"""Arguments of URScript's functions: by place or by name."""
+"""Arguments of URScript's functions: by place or by name, and those that change what the others mean."""
 
 import numpy as np
 import pytest
 
 from tests.program_tools import names_changed, reasons, rewritten, says
 from tests.test_programs_urscript import PATH, SHIFT, UR, pose_text
+from truearm.programs.densify import FROM_ANYWHERE, Spacing
+from truearm.programs.solving import UNKNOWN_BEFORE
 from truearm.programs.tables import Motion
+from truearm.programs.urscript_reader import PERHAPS_ALONG, TURNED_ALONG
 from truearm.robot import Robot
 
 FRAME = "p[0.05, 0.02, 0, 0, 0, 0.1]"
@@ -72,3 +75,50 @@ def test_tcp_and_payload_are_read_by_name(robot):
     assert result.changed.all()
     assert np.abs(result.nominal - PATH[:2]).max() < 1e-7
     assert {one.payload_kg for one in result.program.environments} == {1.25}
+
+
+MODES = {
+    "": None,
+    ", mode=0": None,
+    ", mode=kept": None,
+    ", 1.2, 0.25, 0, 1": TURNED_ALONG,
+    ", mode=1": TURNED_ALONG,
+    ", mode=2": PERHAPS_ALONG,
+    ", mode=get_digital_in(2)": PERHAPS_ALONG,
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("end", ["p", "q", "there"])
+def test_behind_an_arc_that_turns_the_tool_along_no_orientation_is_taken_for_known(robot, mode, end):
+    """Script Manual, movec: of pose_to "only position is used in Fixed orientation mode"."""
+    via, there, behind = (f"p[{pose_text(robot, q)}]" for q in PATH[1:4])
+    to = {"p": there, "q": PATH[2].tolist(), "there": "there"}[end]
+    text = f"kept = 0\nthere = {there}\n{START}movec({via}, {to}{mode})\nmovel({behind})\nmovel({there})\n"
+    result = rewritten(UR, text, robot, by=SHIFT, spacing=Spacing.of(1e-6, 5.0))
+    told = [reason for _, _, reason in reasons(result)]
+    if MODES[mode] is None:
+        assert told == []
+        assert result.changed.all()
+    else:
+        assert told == [MODES[mode], MODES[mode], UNKNOWN_BEFORE, UNKNOWN_BEFORE]
+        assert names_changed(result) == [4]
+        assert result.inserted == 0
+
+
+def test_a_pose_of_such_an_arc_is_changed_for_no_other_motion(robot):
+    via, there, behind = (f"p[{pose_text(robot, q)}]" for q in PATH[1:4])
+    joints = f"movej({PATH[3].tolist()})\n"
+    text = f"there = {there}\n{START}movec({via}, there, mode=1)\n{joints}movel(there)\nmovel({behind})\n"
+    result = rewritten(UR, text, robot, by=SHIFT)
+    assert [reason for _, name, reason in reasons(result) if name == "there"] == [TURNED_ALONG]
+
+
+def test_no_waypoint_has_an_orientation_that_the_tool_has_not_behind_such_an_arc(robot):
+    via, there, behind = (f"p[{pose_text(robot, q)}]" for q in PATH[1:4])
+    near = PATH[3].tolist()
+    text = f"{START}movec({via}, {there}, mode=1)\nmovel(get_inverse_kin({behind}, {near}))\n"
+    result = rewritten(UR, text, robot, by=SHIFT, spacing=Spacing.of(1e-6, 5.0))
+    assert names_changed(result) == [2, 4]
+    assert result.inserted == 0
+    assert [one.listed.reason for one in result.deviating] == [FROM_ANYWHERE]

@@ -66,12 +66,21 @@ INSTALLATION: Final = "installation"
 
 
 class MotionCall(NamedTuple):
-    """A motion to a target, where it is not one of Lines."""
+    """A motion to a target, where it is not one of Lines.
+
+    Attributes:
+        at: Offset of the statement.
+        target: Where it goes.
+        motion: How.
+        blended: Whether the arm does not stop there.
+        mode: How movec turns the tool, as it is given; None where it is not.
+    """
 
     at: int
     target: Node
     motion: Motion
     blended: bool
+    mode: Node | None = None
 
 
 class Collected:
@@ -258,11 +267,12 @@ class Collected:
             ]
         else:
             pairs = [(argument(node, 0, TARGETS.get(node.text, "pose")), MOTIONS[node.text])]
+        mode = argument(node, 5, "mode") if node.text == "movec" else None
         for target, motion in pairs:
             if target is None:
                 self.leave(node.start, "", "it has no target")
             else:
-                self.motions.append(MotionCall(node.start, target, motion, _blended(node)))
+                self.motions.append(MotionCall(node.start, target, motion, _blended(node), mode))
                 self._note(_of_numbers(target), node.start)
         targets = [target for target, _ in pairs]
         others = [part for part in node.parts if not any(part is target for target in targets)]

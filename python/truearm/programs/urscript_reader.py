@@ -1,7 +1,7 @@
 """Tables of a URScript program's targets and moves, with what TCP and offsets each is gone to."""
 
 from array import array
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -20,6 +20,14 @@ from truearm.programs.urscript_places import Place, Places, numbers_of
 from truearm.types import Integers
 
 ALSO_A_FRAME: Final = "it is also an offset, or a frame, of another target"
+TURNED_ALONG: Final = (
+    "with mode=1 (fixed orientation) movec heeds its position alone and turns the tool along with the arc: "
+    "with mode=0 the tool turns to what is written"
+)
+PERHAPS_ALONG: Final = (
+    "movec has a mode that is computed when the program runs, or not known, and may heed its position alone: "
+    "with mode=0 the tool turns to what is written"
+)
 
 
 @dataclass
@@ -167,10 +175,27 @@ class Reader:
         for motion in self._collected.motions:
             places.note_direct(motion.target)
         resolved = [(motion, self._places(places, motion)) for motion in self._collected.motions]
-        frames = {other for _, found in resolved for place in found for other in place.others}
+        others = (other for _, found in resolved for place in found for other in place.others)
+        problems = dict.fromkeys(others, ALSO_A_FRAME)
+        for motion, found in resolved:
+            turned = self._turned_along(motion)
+            problems.update({place.leaf.start: turned for place in found if turned})
+            if turned:
+                # The tool is turned otherwise than the target: what comes next starts from elsewhere.
+                self._collected.breaks.append(motion.at + 1)
         for motion, found in resolved:
             for place in found:
-                self._use(motion, place, frames, alone=len(found) > 1)
+                self._use(motion, place, problems, alone=len(found) > 1)
+
+    def _turned_along(self, motion: MotionCall) -> str:
+        """Why a movec may turn the tool otherwise than its target is turned; empty if it does not."""
+        if motion.mode is None:
+            return ""
+        try:
+            mode = self._collected.constants.number(motion.mode)
+        except RunTime:
+            return PERHAPS_ALONG
+        return {0.0: "", 1.0: TURNED_ALONG}.get(mode, PERHAPS_ALONG)
 
     def _places(self, places: Places, motion: MotionCall) -> list[Place]:
         try:
@@ -186,7 +211,7 @@ class Reader:
     def _leave(self, motion: MotionCall, name: str, unknown: RunTime) -> None:
         self._collected.leave(motion.at, name, unknown.reason, motion.motion, blended=motion.blended)
 
-    def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
+    def _use(self, motion: MotionCall, place: Place, problems: Mapping[int, str], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]
         try:
             target = self._leaves.number(place)
@@ -195,16 +220,17 @@ class Reader:
             self._leave(motion, place.name, unknown)
             return
         if seed is not None and place.seed is not None:
-            environment = self._environment(state, None, self._problem(place.seed, frames))
+            environment = self._environment(state, None, self._problem(place.seed, problems))
             number = self.found.environments.number(environment)
             self._rows.add(seed, motion.at, int(Motion.SEED), 0, number, int(alone))
-        number = self.found.environments.number(self._environment(state, place, self._problem(place, frames)))
+        environment = self._environment(state, place, self._problem(place, problems))
+        number = self.found.environments.number(environment)
         row = (target, motion.at, int(motion.motion), int(motion.blended), number)
         self._rows.add(*row, int(alone and seed is None))
 
-    def _problem(self, place: Place, frames: Iterable[int]) -> str:
-        if place.leaf.start in frames:
-            return ALSO_A_FRAME
+    def _problem(self, place: Place, problems: Mapping[int, str]) -> str:
+        if place.leaf.start in problems:
+            return problems[place.leaf.start]
         if place.name in self._collected.elsewhere:
             line = self._source.place(self._collected.elsewhere[place.name])[0]
             return f'"{place.name}" is also used in line {line} for something else than a motion'
