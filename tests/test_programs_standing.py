@@ -130,7 +130,7 @@ def test_a_seed_behind_a_jump_tells_the_solution_and_not_the_place(universal):
         "while True:\n  {}\nend",
         "if get_standard_digital_in(0):\n  halt\nelse:\n  {}\nend",
         "go()\n{}",
-        "movel(get_target_tcp_pose())\n{}",
+        "movej(get_target_joint_positions())\n{}",
     ],
 )
 def test_a_pose_behind_a_place_that_is_not_known_says_so(universal, lines):

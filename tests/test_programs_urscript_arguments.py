@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.program_tools import names_changed, reasons, rewritten, says
+from tests.program_tools import Bend, names_changed, reasons, rewritten, says
 from tests.test_programs_urscript import PATH, SHIFT, UR, pose_text
-from truearm.programs.densify import FROM_ANYWHERE, Spacing
-from truearm.programs.solving import UNKNOWN_BEFORE
+from truearm.programs.densify import Spacing
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_reader import PERHAPS_ALONG, TURNED_ALONG
 from truearm.robot import Robot
@@ -90,20 +89,22 @@ MODES = {
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("end", ["p", "q", "there"])
-def test_behind_an_arc_that_turns_the_tool_along_no_orientation_is_taken_for_known(robot, mode, end):
+def test_an_arc_that_turns_the_tool_along_does_not_end_as_its_target_is_turned(robot, mode, end):
     """Script Manual, movec: of pose_to "only position is used in Fixed orientation mode"."""
     via, there, behind = (f"p[{pose_text(robot, q)}]" for q in PATH[1:4])
     to = {"p": there, "q": PATH[2].tolist(), "there": "there"}[end]
-    text = f"kept = 0\nthere = {there}\n{START}movec({via}, {to}{mode})\nmovel({behind})\nmovel({there})\n"
-    result = rewritten(UR, text, robot, by=SHIFT, spacing=Spacing.of(1e-6, 5.0))
+    text = f"kept = 0\nthere = {there}\n{START}movec({via}, {to}{mode})\nmovel({behind})\n"
+    result = rewritten(UR, text, robot, by=Bend(), spacing=Spacing.of(1e-3, 2.0))
     told = [reason for _, _, reason in reasons(result)]
     if MODES[mode] is None:
         assert told == []
         assert result.changed.all()
+        assert result.inserted > 0
     else:
-        assert told == [MODES[mode], MODES[mode], UNKNOWN_BEFORE, UNKNOWN_BEFORE]
-        assert names_changed(result) == [4]
+        assert told == [MODES[mode], MODES[mode]]
+        assert names_changed(result) == [4, 6]
         assert result.inserted == 0
+        assert [notice.kind for notice in result.notices] == ["steps"]
 
 
 def test_a_pose_of_such_an_arc_is_changed_for_no_other_motion(robot):
@@ -112,13 +113,3 @@ def test_a_pose_of_such_an_arc_is_changed_for_no_other_motion(robot):
     text = f"there = {there}\n{START}movec({via}, there, mode=1)\n{joints}movel(there)\nmovel({behind})\n"
     result = rewritten(UR, text, robot, by=SHIFT)
     assert [reason for _, name, reason in reasons(result) if name == "there"] == [TURNED_ALONG]
-
-
-def test_no_waypoint_has_an_orientation_that_the_tool_has_not_behind_such_an_arc(robot):
-    via, there, behind = (f"p[{pose_text(robot, q)}]" for q in PATH[1:4])
-    near = PATH[3].tolist()
-    text = f"{START}movec({via}, {there}, mode=1)\nmovel(get_inverse_kin({behind}, {near}))\n"
-    result = rewritten(UR, text, robot, by=SHIFT, spacing=Spacing.of(1e-6, 5.0))
-    assert names_changed(result) == [2, 4]
-    assert result.inserted == 0
-    assert [one.listed.reason for one in result.deviating] == [FROM_ANYWHERE]

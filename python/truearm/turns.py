@@ -30,6 +30,16 @@ def with_turns(branches: Floats, robot: RobotData) -> tuple[Integers, Floats]:
     return rows[order], found[order]
 
 
+def turned_away(q: Floats, robot: RobotData) -> Floats:
+    """Readings (n, N) with each joint a full turn farther, one way or the other, whose limits allow that.
+
+    Joints without limits may be turned as in :func:`with_turns`.
+    """
+    low, high = _limits(robot).T
+    turn = np.where(_turning(robot), FULL_TURN, 0.0)
+    return np.where(q - turn >= low - EDGE_RAD, q - turn, np.where(q + turn <= high + EDGE_RAD, q + turn, q))
+
+
 class NearestTurns:
     """Readings of branches at the turns nearest to others."""
 

@@ -124,6 +124,25 @@ class Follower:
         same = np.flatnonzero(off < CLOSE_RAD)
         return Arrived(int(which[same[0]]), candidates[same[0]]) if len(same) == 1 else UNFOLLOWED
 
+    def kept(self, before: Floats, turned: tuple[Integers, Floats]) -> Arrived | None:
+        """Where the arm arrives over places that are not known, on lines and arcs alone.
+
+        None where its posture is not told or a joint is turned by more than a quarter turn, as it is in the
+        posture from before where the way has led through a singularity.
+
+        Args:
+            before: Readings (N,) that it comes from.
+            turned: As in :meth:`arrived`.
+        """
+        which, candidates = turned
+        here, *names = self._inverse.branch_names(np.concatenate([before[None], candidates]))
+        kept = np.flatnonzero([name == here for name in names])
+        if not self._told_by(here) or len(kept) != 1:
+            return None
+        place = int(kept[0])
+        near = np.abs(candidates[place] - before).max() <= TOLD_RAD
+        return Arrived(int(which[place]), candidates[place]) if near else None
+
     def _told_by(self, name: str) -> bool:
         """Whether a name tells all that an arm keeps on its way: the turn of the wrist where it has one."""
         return name.count(" ") == 2 or (self._fewer and bool(name))

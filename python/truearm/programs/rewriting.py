@@ -31,6 +31,7 @@ from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
 from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets, offset_notices
+from truearm.programs.open_turns import depending_on_turns
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
@@ -244,6 +245,8 @@ def rewrite(
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
+    turning = (models.programming, models.compensator)
+    solved.reasons.update(depending_on_turns(program, uses, solved.q, solved.open_turns, turning))
     # A product with ones would leave threads of BLAS that spin for a while in the way of the corrections.
     known: Mask = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False

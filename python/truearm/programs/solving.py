@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from truearm.inverse import Inverse
+from truearm.programs.carrying import Origins
 from truearm.programs.configuration import ANY, meant
 from truearm.programs.following import CLOSE_RAD, Arrived, Follower, Way
 from truearm.programs.layouts import of_joints, of_pose
@@ -20,7 +21,7 @@ from truearm.programs.tables import NOWHERE, Motion, placed, run_of
 from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
-from truearm.turns import EDGE_RAD, NearestTurns, with_turns
+from truearm.turns import EDGE_RAD, NearestTurns, turned_away, with_turns
 from truearm.types import Floats, Integers, Mask
 from truearm.units import FULL_TURN
 
@@ -65,10 +66,12 @@ class Solved:
     Attributes:
         q: Readings of each target, (t, N), rad and m; NaN where they are not known.
         reasons: Why a target cannot be changed, by its number.
+        open_turns: Numbers of those that the arm may reach at other turns of its joints than `q` says.
     """
 
     q: Floats
     reasons: dict[int, str]
+    open_turns: frozenset[int]
 
 
 def solve_targets(
@@ -86,7 +89,7 @@ def solve_targets(
     solver = _Solver(program, uses, robot, inverse)
     solver.take_joints()
     solver.take_poses(tell)
-    return Solved(solver.q, solver.reasons)
+    return Solved(solver.q, solver.reasons, frozenset(solver.open_turns - solver.reasons.keys()))
 
 
 class _Named(NamedTuple):
@@ -128,11 +131,16 @@ class _Came(NamedTuple):
         before: The readings that it comes from, or a seed; None where they are not known.
         way: The line or the arc on which it comes from there; None where it comes joint by joint.
         nearest: As in Program, of the move; None where configuration data counts.
+        origin: Where the last readings are not known, those of the last known place, if lines and arcs alone
+            lead from there to the target; else None.
+        open_turns: Whether the arm may come at other turns of its joints.
     """
 
     before: Floats | None
     way: Way | None
     nearest: bool | None
+    origin: Floats | None = None
+    open_turns: bool = False
 
 
 class _Solver:
@@ -144,6 +152,9 @@ class _Solver:
         self._follower = Follower(robot, inverse)
         self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
+        self.open_turns: set[int] = set()
+        self._refused: frozenset[int] = frozenset()
+        self._origins = Origins(program.moves, self._known, self._is_lost)
         self._unheeded = {int(program.moves.target[move]) for move in program.nearest}
 
     def take_joints(self) -> None:
@@ -170,6 +181,7 @@ class _Solver:
 
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
         """Cartesian targets, in the order of the moves, each near its seed or where the arm stands."""
+        self._refused = frozenset(self.reasons)
         poses = self._flange_poses()
         moves = self.program.moves
         moved = np.flatnonzero(moves.moving & np.isin(moves.target, list(poses)))
@@ -193,8 +205,20 @@ class _Solver:
             if motion_is_straight(motion):
                 tool = self.program.environments[environment].tool.controller
                 way = Way(tool, poses[target], motion != Motion.LINEAR)
-            came = _Came(self._known(near), way, self.program.nearest.get(move))
-            self._take(target, possible[target], came)
+            self._take(target, possible[target], self._came(move, near, way, possible[target]))
+
+    def _came(self, move: int, near: int, way: Way | None, possible: _Possible) -> _Came:
+        """How the arm comes to a target; at turns that are not known on lines and arcs alone."""
+        before, nearest = self._known(near), self.program.nearest.get(move)
+        at_open_turns = near in self.open_turns
+        if way is None or possible.named is not None or possible.flange is not None:
+            return _Came(None if at_open_turns else before, way, nearest)
+        origin = self._origins.of(move) if before is None else None
+        return _Came(before, way, nearest, origin, at_open_turns or origin is not None)
+
+    def _is_lost(self, target: int) -> bool:
+        """Whether the way to a target whose readings are not known, or the target, may change the posture."""
+        return target not in self._refused and self.reasons.get(target) != UNKNOWN_BEFORE
 
     def _known(self, target: int) -> Floats | None:
         """The readings of a target; None where they are not known."""
@@ -309,6 +333,8 @@ class _Solver:
             self.q[target] = np.nan
         else:
             self.q[target] = found
+            if came.open_turns and (turned_away(found[None], self.robot) != found).any():
+                self.open_turns.add(target)
 
     def _chosen(self, possible: _Possible, came: _Came) -> Floats | str:
         """The readings that are meant, or why they are not known."""
@@ -373,7 +399,7 @@ class _Solver:
         not tell.
         """
         if came.before is None:
-            return UNKNOWN_BEFORE
+            return self._kept(possible, came.origin)
         turned = self._nearest_turns(possible.branches, came.before)
         arrived = None
         if came.way is not None:
@@ -387,6 +413,17 @@ class _Solver:
                 return AMBIGUOUS
             arrived = Arrived(int(which[place]), candidates[place])
         return SINGULAR if possible.at_singularity[arrived.branch] else arrived.q
+
+    def _kept(self, possible: _Possible, origin: Floats | None) -> Floats | str:
+        """The readings in the posture of those from where lines and arcs lead there, at the turns nearest to
+        them, if they tell it.
+        """
+        if origin is None or are_singular(self.robot, origin[None])[0]:
+            return UNKNOWN_BEFORE
+        kept = self._follower.kept(origin, self._nearest_turns(possible.branches, origin))
+        if kept is None:
+            return UNKNOWN_BEFORE
+        return SINGULAR if possible.at_singularity[kept.branch] else kept.q
 
 
 def the_nearest(candidates: Floats, before: Floats | None) -> int | None:

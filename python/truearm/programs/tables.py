@@ -153,6 +153,8 @@ class Moves:
         environment: Number of the environment.
         follows: Whether the move before, in this table, is the one executed before: False behind labels,
             at the heads of loops and behind branches, where the arm may come from several places.
+        over: Where it is not, whether only lines and arcs to places without numbers are executed between;
+            None where that is nowhere known.
     """
 
     target: Integers
@@ -162,6 +164,7 @@ class Moves:
     blended: NDArray[np.bool_]
     environment: Integers
     follows: NDArray[np.bool_]
+    over: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.target)
@@ -174,13 +177,23 @@ class Moves:
     @cached_property
     def before(self) -> Integers:
         """Target that the arm stands at before each, (m,): that of the last move; NOWHERE if not known."""
+        last = self._last(self.follows)
+        return np.where(last == NOWHERE, NOWHERE, self.target[last])
+
+    @cached_property
+    def previous(self) -> Integers:
+        """The last move before each, (m,), if it follows that or comes over lines and arcs; else NOWHERE."""
+        return self._last(self.follows if self.over is None else self.follows | self.over)
+
+    def _last(self, linked: NDArray[np.bool_]) -> Integers:
+        """The last move before each that moves the arm, (m,), if it is `linked` (m,) to it; else NOWHERE."""
         moved = np.flatnonzero(self.moving)
         places = np.searchsorted(moved, np.arange(len(self))) - 1
         known = places >= 0
         last = moved[places[known]]
-        breaks = np.cumsum(~self.follows)
+        breaks = np.cumsum(~linked)
         found = np.full(len(self), NOWHERE, dtype=np.int64)
-        found[known] = np.where(breaks[last] == breaks[known], self.target[last], NOWHERE)
+        found[known] = np.where(breaks[last] == breaks[known], last, NOWHERE)
         return found
 
     @cached_property

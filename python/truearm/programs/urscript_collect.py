@@ -94,6 +94,7 @@ class Collected:
         found: Motions without a target.
         shifted: Why no target is where it is written; empty if they are.
         breaks: Offsets behind which the arm may come from several places.
+        over: Offsets behind which it comes on a line or an arc from a place without numbers.
     """
 
     def __init__(self, source: Source) -> None:
@@ -103,7 +104,7 @@ class Collected:
         self.elsewhere: dict[str, int] = {}
         self.found = Gathered((source,))
         self.shifted = ""
-        self.breaks = array("q")
+        self.breaks, self.over = array("q"), array("q")
         self._source = source
         self._scopes = Scopes()
         self._steps: list[Step] = []
@@ -123,7 +124,14 @@ class Collected:
         return frozenset(name.decode("ascii") for name in DEFINED.findall(self._source.content))
 
     def leave(
-        self, at: int, name: str, reason: str, motion: Motion | None = None, *, blended: bool = False
+        self,
+        at: int,
+        name: str,
+        reason: str,
+        motion: Motion | None = None,
+        *,
+        blended: bool = False,
+        over: bool = False,
     ) -> None:
         """Something is left as it is, and where the arm comes from behind it is not known.
 
@@ -133,9 +141,10 @@ class Collected:
             reason: Why, in words that end a listing.
             motion: How the arm goes to a place that is not read; None where it goes to none.
             blended: Whether it does not stop there.
+            over: Whether it certainly goes there, and on a line or an arc.
         """
         self.found.leave((0, at), reason, name)
-        self.breaks.extend((at, at + 1))
+        (self.over if over else self.breaks).extend((at, at + 1))
         if motion is not None:
             self.found.unplace((0, at), motion, blended=blended)
 

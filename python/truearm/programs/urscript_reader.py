@@ -1,7 +1,7 @@
 """Tables of a URScript program's targets and moves, with what TCP and offsets each is gone to."""
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.programs.environment import Environment
 from truearm.programs.frames import Frames
+from truearm.programs.program import motion_is_straight
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Moves, Number, Targets
 from truearm.programs.urscript_collect import Collected, MotionCall
@@ -89,6 +90,7 @@ class Reader:
         self._states = [flow[int(at)] for at in self._offsets]
         self._leaves = _Leaves()
         self._rows = _Rows()
+        self._along: dict[int, str] = {}
         self._slow()
 
     def tables(self) -> tuple[Targets, Moves]:
@@ -116,6 +118,10 @@ class Reader:
             factors=_factors([c.factors for c in lines], leaves.numbers[-1], order),
             names={int(rank[count + number]): name for number, name in leaves.names.items()},
         )
+        for start in self._along.keys() & leaves.known.keys():
+            number = int(rank[count + leaves.known[start]])
+            self.found.keep([number], self._along[start])
+            self.found.unsure.add(number)
         own = rank[count + np.array(rows[0], dtype=np.int64)]
         return targets, self._moves(lines, _joined([rank[:count]], own))
 
@@ -131,9 +137,10 @@ class Reader:
         order = _order(at)
         follows = ~alone[order]
         follows[1:] &= ~alone[order][:-1]
-        behind = np.searchsorted(at[order], np.array(self._collected.breaks, dtype=np.int64))
-        follows[behind[behind < len(at)]] = False
+        follows[_behind(at[order], self._collected.breaks)] = False
         follows[:1] = False
+        over = np.array(follows)
+        follows[_behind(at[order], self._collected.over)] = False
         return Moves(
             target[order],
             np.broadcast_to(0, len(at)),
@@ -142,6 +149,7 @@ class Reader:
             blended[order].astype(bool, copy=False),
             environment[order],
             follows,
+            over,
         )
 
     def _state(self, at: Integers) -> Integers:
@@ -175,17 +183,13 @@ class Reader:
         for motion in self._collected.motions:
             places.note_direct(motion.target)
         resolved = [(motion, self._places(places, motion)) for motion in self._collected.motions]
-        others = (other for _, found in resolved for place in found for other in place.others)
-        problems = dict.fromkeys(others, ALSO_A_FRAME)
+        frames = {other for _, found in resolved for place in found for other in place.others}
         for motion, found in resolved:
             turned = self._turned_along(motion)
-            problems.update({place.leaf.start: turned for place in found if turned})
-            if turned:
-                # The tool is turned otherwise than the target: what comes next starts from elsewhere.
-                self._collected.breaks.append(motion.at + 1)
-        for motion, found in resolved:
             for place in found:
-                self._use(motion, place, problems, alone=len(found) > 1)
+                self._use(motion, place, frames, alone=len(found) > 1)
+                if turned:
+                    self._along.setdefault(place.leaf.start, turned)
 
     def _turned_along(self, motion: MotionCall) -> str:
         """Why a movec may turn the tool otherwise than its target is turned; empty if it does not."""
@@ -209,9 +213,12 @@ class Reader:
         return found
 
     def _leave(self, motion: MotionCall, name: str, unknown: RunTime) -> None:
-        self._collected.leave(motion.at, name, unknown.reason, motion.motion, blended=motion.blended)
+        over = motion_is_straight(motion.motion)
+        self._collected.leave(
+            motion.at, name, unknown.reason, motion.motion, blended=motion.blended, over=over
+        )
 
-    def _use(self, motion: MotionCall, place: Place, problems: Mapping[int, str], *, alone: bool) -> None:
+    def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]
         try:
             target = self._leaves.number(place)
@@ -220,21 +227,27 @@ class Reader:
             self._leave(motion, place.name, unknown)
             return
         if seed is not None and place.seed is not None:
-            environment = self._environment(state, None, self._problem(place.seed, problems))
+            environment = self._environment(state, None, self._problem(place.seed, frames))
             number = self.found.environments.number(environment)
             self._rows.add(seed, motion.at, int(Motion.SEED), 0, number, int(alone))
-        environment = self._environment(state, place, self._problem(place, problems))
+        environment = self._environment(state, place, self._problem(place, frames))
         number = self.found.environments.number(environment)
         row = (target, motion.at, int(motion.motion), int(motion.blended), number)
         self._rows.add(*row, int(alone and seed is None))
 
-    def _problem(self, place: Place, problems: Mapping[int, str]) -> str:
-        if place.leaf.start in problems:
-            return problems[place.leaf.start]
+    def _problem(self, place: Place, frames: Iterable[int]) -> str:
+        if place.leaf.start in frames:
+            return ALSO_A_FRAME
         if place.name in self._collected.elsewhere:
             line = self._source.place(self._collected.elsewhere[place.name])[0]
             return f'"{place.name}" is also used in line {line} for something else than a motion'
         return ""
+
+
+def _behind(at: Integers, places: "array[int]") -> Integers:
+    """The first of the moves at offsets (m,), ascending, behind each of some places, if there is one."""
+    found = np.searchsorted(at, np.array(places, dtype=np.int64))
+    return found[found < len(at)]
 
 
 def _row(number: Number) -> tuple[float, ...]:
