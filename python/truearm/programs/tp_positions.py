@@ -132,7 +132,7 @@ def _position(text: str, found: re.Match[str], joint_count: int) -> Position:
 
 
 def _first_group(text: str, start: int, end: int) -> tuple[int, int] | None:
-    """The part of a position that is of motion group 1: all where no group is named; None where others are."""
+    """The part of a position that is of motion group 1: all where no group is named; None without it."""
     marks = list(_GROUP.finditer(text, start, end))
     for mark, behind in zip(marks, [*marks[1:], None], strict=False):
         if mark.group(1) == "1":
