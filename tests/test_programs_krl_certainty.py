@@ -333,3 +333,98 @@ def test_arrays_of_two_dimensions_are_told_as_such(use, stored):
     dat = "DECL E6POS XP[2,2]\n" + "".join(f"XP[{i},{k}]={HERE}\n" for i, k in stored)
     found = reasons(f"{ALREADY}PTP {use}\nEND\n", f"DEFDAT a\n{dat}ENDDAT\n")
     assert set(found.values()) == {"arrays of more dimensions than one are not read"}
+
+
+KEPT, CHOSEN = "keeps the orientation that it comes with", "the controller chooses the orientation"
+LINE_DATA = "DECL LDAT LC@={VEL 2.0,ACC 100.0,APO_DIST 100.0,APO_FAC 50.0,ORI_TYP #MODE,CIRC_TYP #BASE}\n"
+DATA = FRAME_DATA + "".join(
+    LINE_DATA.replace("@", mode).replace("MODE", mode) for mode in ("VAR", "CONSTANT")
+)
+DATA += "DECL LDAT LCNONE={VEL 2.0}\nDECL LDAT LCTWICE={ORI_TYP #VAR}\nLCTWICE.ORI_TYP=#CONSTANT\n"
+DATA = DATA.replace("TOOL_NO 1", "TOOL_NO 0")
+
+
+def inline(name):
+    """What an inline form of a line sets, with line data of a name."""
+    return f"LDAT_ACT={name}\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2.0)"
+
+
+@pytest.mark.parametrize(
+    ("before", "told"),
+    [
+        ("$ORI_TYPE=#CONSTANT", KEPT),
+        ("$ori_type = #constant ;kept", KEPT),
+        ("$ORI_TYPE=#IGNORE", CHOSEN),
+        ("$ORI_TYPE=MODE", "$ORI_TYPE: it is computed at run time"),
+        (inline("LCCONSTANT"), KEPT),
+        (inline("{VEL 2.0,ACC 100.0,ORI_TYP #CONSTANT}"), KEPT),
+        (inline("LCTWICE"), "$ORI_TYPE: LCTWICE does not tell it in this program"),
+        ("LDAT_ACT=LCVAR\nLDAT_ACT.ORI_TYP=#CONSTANT\nBAS(#CP_DAT)", KEPT),
+        ("IF $IN[1] THEN\n$ORI_TYPE=#CONSTANT\nENDIF", "$ORI_TYPE: it is not the same on all ways"),
+        (f"{inline('LCCONSTANT')}\n{inline('LCNONE')}", KEPT),
+        ("turned()", "$ORI_TYPE: a subroutine was called"),
+        ("OUTSIDE()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME", "$ORI_TYPE: a subroutine was called"),
+        ("INTERRUPT DECL 5 WHEN $IN[1] DO turned()", "$ORI_TYPE: an interrupt or a trigger"),
+        ("$ORI_TYPE=#CONSTANT\nGOTO over\n$ORI_TYPE=#VAR\nover:\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME", "GOTO"),
+    ],
+)
+def test_orientations_that_the_controller_does_not_take_from_the_target(before, told):
+    behind = "DEF turned()\n$ORI_TYPE=#CONSTANT\nEND\n"
+    src = f"{ALREADY}PTP {HERE}\n{before}\n@\nPTP {HERE}\nEND\n{behind}"
+    for move in (f"LIN {THERE}", f"SLIN {THERE}", f"SPLINE\nSPL {THERE}\nENDSPLINE"):
+        assert changed(src.replace("@", move), DATA) == [True, False, True]
+        assert told in why(src.replace("@", move), DATA)
+    assert changed(src.replace("@", f"PTP {THERE}"), DATA) == [True, True, True]
+    assert changed(src.replace("@", f"CIRC {HERE},{THERE}"), DATA) == [True, False, False, True]
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "$ORI_TYPE=#VAR",
+        "$ORI_TYPE=#CONSTANT\n$ORI_TYPE=#JOINT",
+        "$ORI_TYPE=#CONSTANT\nBAS(#INITMOV,0)\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME",
+        f"{inline('LCCONSTANT')}\n{inline('LCVAR')}",
+        f"$ORI_TYPE=#CONSTANT\n{inline('LDEFAULT')}",
+        inline("LCNONE"),
+        "FDAT_ACT=FP1\nBAS(#CP_PARAMS,2.0)",
+        "BAS(#PTP_PARAMS,100)\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME",
+        "even()",
+        f"SLIN {HERE} WITH $ORI_TYPE=#VAR",
+    ],
+)
+def test_orientations_that_count(before):
+    behind = "DEF even()\n$ORI_TYPE=#VAR\nWAIT SEC 1\nEND\n"
+    assert all(changed(f"{ALREADY}PTP {HERE}\n{before}\nLIN {THERE}\nEND\n{behind}", DATA))
+
+
+@pytest.mark.parametrize("own", ["#CONSTANT", "SORI_TYP(LCCONSTANT)", "SORI_TYP( LCCONSTANT )", "#IGNORE"])
+def test_orientations_of_one_motion_or_one_spline(own):
+    splines = f"SPLINE\nSPL {THERE} WITH $ORI_TYPE={own}\nSLIN {HERE}\nENDSPLINE"
+    assert changed(f"{ALREADY}PTP {HERE}\n{splines}\nEND\n", DATA) == [True, False, True]
+    around = (
+        f"SPLINE WITH $ORI_TYPE={own}\nSPL {THERE}\nSLIN {HERE} WITH $ORI_TYPE=SORI_TYP(LCVAR)\nENDSPLINE"
+    )
+    assert changed(f"{ALREADY}PTP {HERE}\n{around}\nSLIN {THERE}\nEND\n", DATA) == [True, False, True, True]
+
+
+def test_a_routine_that_leaves_orientations_and_not_the_tool():
+    weld = f"DEF weld()\n$TOOL=TOOL_DATA[2]\n$BASE=$NULLFRAME\nLIN {THERE}\nEND\n"
+    src = f"{ALREADY}PTP {HERE}\nweld()\n@\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nLIN {HERE}\nEND\n{weld}"
+    assert changed(src.replace("@", "")) == [True, True, True]
+    assert changed(src.replace("@", "$ORI_TYPE=#CONSTANT\nweld()")) == [True, False, False]
+
+
+def test_a_loop_that_comes_round_with_orientations_that_do_not_count():
+    src = f"{ALREADY}LOOP\nPTP {HERE}\nLIN {THERE}\n$ORI_TYPE=#CONSTANT\nENDLOOP\nEND\n"
+    assert changed(src) == [True, False]
+    assert "a loop comes round to it with another tool, base or $ORI_TYPE" in why(src)
+
+
+def test_no_waypoints_turn_where_the_tool_does_not():
+    """Between two targets of one orientation lies one with another, which the arm does not take."""
+    turned = pose_text([0, -90, 100, 20, 45, 90], decimals=5)
+    done, _ = densified(f"PTP {HERE}\n$ORI_TYPE=#CONSTANT\nLIN {turned}\n$ORI_TYPE=#VAR\nLIN {THERE}")
+    assert done.changed.tolist() == [True, False, True]
+    assert done.inserted == 0
+    assert densified(f"PTP {HERE}\nLIN {turned}\nLIN {THERE}")[0].inserted > 1

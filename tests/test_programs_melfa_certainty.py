@@ -112,14 +112,37 @@ def test_motions_that_track_a_conveyor_are_left(robot):
     assert left(robot, [TOOL, "Trk On,PX,P_Curr", "Trk Off", "Mvs P1"]) == {}
 
 
-@pytest.mark.parametrize("call", ['CallP "SETTOOL"', 'If M1=1 Then CallP "X",M2', "RelM"])
-def test_another_program_may_set_tool_and_base(robot, call):
+CALLED = "the program called in line 3 may have set another "
+RELEASED = "RelM in line 3 lets another program have the arm, which may set another "
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [('CallP "SETTOOL"', CALLED), ('If M1=1 Then CallP "X",M2', CALLED), ("RelM", RELEASED)],
+)
+def test_another_program_may_set_tool_and_base(robot, call, told):
     result = left(robot, [TOOL, "Mov P1", call, "Mov P2", TOOL, "Mov P3"])
-    assert result == {
-        "P2": "the program called in line 3 may have set another tool",
-        "P3": "the program called in line 3 may have set another base",
-    }
+    assert result == {"P2": f"{told}tool", "P3": f"{told}base"}
     assert "P3" not in left(robot, [TOOL, "Mov P1", call, TOOL, "Base 0", "Mov P3"])
+
+
+@pytest.mark.parametrize("getting", ["GetM 2", "If M_In(1)=1 Then GetM 3", "getm M1"])
+def test_places_of_another_mechanism_are_left(robot, getting):
+    lines = [TOOL, "Mov P1", getting, OTHER, "Base 0", "Mov P2", "GetM 1", "@", "Base 0", "Mvs P3"]
+    told = "in line 6 it is a place of the mechanism that GetM gets in line 3, and mechanism 1 is corrected"
+    again = [TOOL if line == "@" else line for line in lines]
+    assert left(robot, again) == {"P2": told}
+    bent = rewritten(MELFA, program(robot, again), robot, by=Bend(), spacing=FINE_STEPS)
+    assert bent.inserted == 0, "where the arm stands behind another mechanism's motions is not known"
+    never = [line for line in lines if line != "@"]
+    lost = "GetM in line 7 changes the mechanism, and its tool is not known until it is set again"
+    assert left(robot, never) == {"P2": told, "P3": lost}
+
+
+def test_the_mechanism_that_a_program_gets_at_its_start_is_the_arm(robot):
+    assert left(robot, ["GetM 1", TOOL, "Mov P1", "Mov P2", "Mov P3"]) == {}
+    assert left(robot, [TOOL, "RelM", "GetM 1", TOOL, "Base 0", "Mov P1"]) == {}
+    assert "P1" in left(robot, ["GetM 2", "*L", TOOL, "Mov P1", "GetM 1", "GoTo *L"])
 
 
 def test_bases_are_followed_like_tools_and_apart_from_them(robot):
@@ -362,3 +385,24 @@ def test_a_tool_that_is_held_for_certain_is_the_one_that_is_set(robot, seed):
         runs.run()
         for line, tools in runs.tools.items():
             assert "" in held[line] or tools <= held[line], (lines[line], line, text)
+
+
+PLACED = (("A", 0.0), ("B", 0.05), ("C", 0.02))
+
+
+def test_start_and_end_of_an_arc_stay_as_far_from_its_centre_as_each_other(robot):
+    told = (
+        "it is used in line 4 by Mvr3, whose start and end have to be equally far from its centre, within "
+        "0.01 mm: to have it corrected, use Mvr with a point of the arc"
+    )
+    lines = [TOOL, "Mov PA", "Mov PC", "Mvr3 PA,PB,PC", "Mvs P1"]
+    alone = program(robot, lines, **{f"P{name}": position(robot, Q[0] + by, 0.12) for name, by in PLACED})
+    done = rewritten(MELFA, alone, robot, by=SHIFT)
+    assert {name: why for _, name, why in reasons(done) if why.startswith("it is")} == dict.fromkeys(
+        ("PA", "PB", "PC"), told
+    )
+    nowhere_else = rewritten(MELFA, alone.replace("Mov PC", "Dly 1"), robot, by=SHIFT)
+    assert {name for _, name, why in reasons(nowhere_else) if why == told} == {"PA", "PB"}
+    for result in (done, nowhere_else):
+        assert names_changed(result) == ["P1"]
+        assert b"\nPC=" + position(robot, Q[0] + PLACED[2][1], 0.12).encode() in result.contents[0]

@@ -146,3 +146,43 @@ def test_a_path_behind_a_call_is_followed_from_the_first_target_that_is_known():
 def test_a_target_that_two_motions_mean_differently_is_left():
     body = f"{HERE}MoveJ pA,{GO}\n{OFF_J}{HERE}MoveJ pA,{GO}"
     assert isinstance(solved(body)["pa"], str)
+
+
+LOCK, UNLOCK = "SingArea\\LockAxis4;\n", "SingArea\\Wrist;\n"
+ONTO = f"{HERE}MoveL pTold,{GO}\n"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"{LOCK}{ONTO}",
+        f"{LOCK}{HERE}MoveC pTold,pB,{GO}",
+        f"IF b THEN\n{LOCK}ENDIF\n{ONTO}",
+        f"{LOCK}other;\n{UNLOCK}{HERE}MoveJ pA,{GO}\n{OTHER}{ONTO}",
+        f"lock;\n{ONTO}ENDPROC\nPROC lock()\n{LOCK}",
+        f"b:=Lock();\n{ONTO}ENDPROC\nFUNC bool Lock()\n{LOCK}RETURN TRUE;\nENDFUNC\nPROC last()\n",
+        f"{ONTO}ENDPROC\nTRAP bell\n{LOCK}ENDTRAP\nPROC last()",
+    ],
+)
+def test_lines_and_arcs_on_which_axis_4_is_locked_are_left(body):
+    assert "SingArea \\LockAxis4" in solved(body)["ptold"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"{UNLOCK}{ONTO}",
+        f"{LOCK}{UNLOCK}{ONTO}",
+        f"{LOCK}SingArea\\Off;\n{ONTO}",
+        f"{LOCK}{HERE}MoveJ pTold,{GO}",
+        f"{ONTO}{LOCK}{HERE}MoveL pB,{GO}",
+    ],
+)
+def test_motions_on_which_axis_4_is_free_are_not(body):
+    assert stands(solved(body)["ptold"], TURNED)
+
+
+def test_behind_a_line_on_which_axis_4_is_locked_the_arm_stands_in_another_orientation():
+    free = f"{OFF_L}{HERE}MoveL pTold,{GO}\n"
+    assert stands(solved(f"{free}MoveL pB,{GO}")["pb"], BESIDE)
+    assert solved(f"{LOCK}{free}{UNLOCK}MoveL pB,{GO}")["pb"] == UNHEEDED

@@ -59,9 +59,7 @@ def stops(language, content, robot, frames=""):
     return robot.flange_chain.pose(robot.joints_from_readings(q))[:, :3, 3]
 
 
-@pytest.mark.parametrize(
-    ("arc", "end"), [("Mvr2 P1,P2,P3", 1), ("Mvr3 P1,P2,P3", 1), ("Mvr P1,P3,P2", 1), ("Mvc P1,P2,P3", 0)]
-)
+@pytest.mark.parametrize(("arc", "end"), [("Mvr2 P1,P2,P3", 1), ("Mvr P1,P3,P2", 1), ("Mvc P1,P2,P3", 0)])
 @pytest.mark.parametrize("first", ["Mov P3", "Mov P1"])
 def test_a_line_behind_an_arc_begins_where_the_arc_ends(mitsubishi, arc, end, first):
     text = melfa(mitsubishi, first, "Mov P1", arc, "Mvs P4")
@@ -84,8 +82,8 @@ def test_places_of_melfa_arcs(mitsubishi):
         assert before(read(MELFA, text, mitsubishi, FLANGE))[-1] == NOWHERE, arc
 
 
-def test_the_centre_of_an_arc_may_be_out_of_reach(mitsubishi):
-    text = melfa(mitsubishi, "Mov P2", "Mvr3 P2,P4,P1", "Mvs P3")
+def test_a_point_beside_an_arc_may_be_out_of_reach(mitsubishi):
+    text = melfa(mitsubishi, "Mov P2", "Mvr2 P2,P4,P1", "Mvs P3")
     text = text.replace(f"P1={position(mitsubishi, PLACES[0])}", "P1=(0,0,5000,0,0,0)(7,0)")
     done = rewritten(MELFA, text, mitsubishi, by=1e-3, frames=FLANGE)
     assert done.changed.tolist() == [False, True, True, True]

@@ -191,6 +191,7 @@ def _broken(text):
             "N U T,", "N L U T,"
         ): "its CONFIG is not three letters N/F U/D T/B and three turn numbers of at most 99",
         text.replace("R =", "Q ="): "it does not state R",
+        text.replace("GP1:", "GP2:"): "it has no motion group 1 (GP1), whose arm is corrected",
     }
 
 

@@ -14,11 +14,13 @@ from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
 from truearm.programs.gathered import Gathered
 from truearm.programs.krl_order import Order, Place
+from truearm.programs.krl_orientation import MODAL
 from truearm.programs.krl_routines import (
     BAS_LEAVING,
     DOING_LATER,
     EXTERNAL,
     LEAVING,
+    ORIENTATION,
     SETTING,
     Routine,
     Routines,
@@ -116,7 +118,7 @@ class KrlReading:
         self._found = Gathered(sources)
         self._storage = KrlStorage()
         self._numbers: dict[str, int] = {}
-        self._in_spline, self._interrupting = False, False
+        self._in_spline, self._interrupting, self._disorienting = False, False, False
         self._used: list[int | None] = []
         self._calls: dict[str, list[Call]] = {}
         for number in self._data_first():
@@ -195,7 +197,9 @@ class KrlReading:
             if self._routines.local(name):
                 self._called(name)
             if not self._routines.leaves(name) or (touched and name not in LEAVING):
-                self._flow.state = self._flow.state.lost(CALLED)
+                self._flow.state = self._flow.state.without_frames(CALLED)
+            if not self._routines.leaves(name, ORIENTATION):
+                self._flow.state = self._flow.state.disoriented(CALLED)
             if self._routines.local(name) or name not in LEAVING:
                 self._flow.jump()
         for name in called(later):
@@ -203,7 +207,9 @@ class KrlReading:
                 call = Call(None, self._flow.state.lost(INTERRUPTED), self._order.here())
                 self._calls.setdefault(name, []).append(call)
             self._interrupting |= not self._routines.leaves(name)
-        self._interrupting |= set_later(later)
+            self._disorienting |= not self._routines.leaves(name, ORIENTATION)
+        if set_later(later):
+            self._interrupting = self._disorienting = True
         if later and found[0].text.lower() != "trigger":
             self._after_interrupts()
 
@@ -217,12 +223,14 @@ class KrlReading:
     def _after_interrupts(self) -> None:
         """What interrupts and triggers may have set by now."""
         if self._interrupting and not self._in_spline:
-            self._flow.state = self._flow.state.lost(INTERRUPTED)
+            self._flow.state = self._flow.state.without_frames(INTERRUPTED)
+        if self._disorienting and not self._in_spline:
+            self._flow.state = self._flow.state.disoriented(INTERRUPTED)
 
     def _statement(self, word: str, reader: Reader, place: tuple[int, int]) -> None:
         flow = self._flow
         if word in OPENING:
-            flow.state = replace(flow.state, prepared=NOTHING) if OPENING[word] else flow.state
+            flow.state = flow.state.unprepared() if OPENING[word] else flow.state
             flow.open(loop=OPENING[word])
             self._order.open()
         elif word in CLOSING:
@@ -266,6 +274,9 @@ class KrlReading:
         elif command not in BAS_LEAVING:
             name = f"#{command.upper()}" if command else ""
             self._flow.state = state.lost(f"BAS({name}) was called since it was set")
+        if command:
+            orientation = state.orientation.behind_bas(command)
+            self._flow.state = replace(self._flow.state, orientation=orientation)
 
     def _assignment(self, file: int, reader: Reader) -> None:
         variable = named(reader)
@@ -279,6 +290,9 @@ class KrlReading:
         elif variable.name == "fdat_act":
             prepared = self._frame_data(file, reader) if whole else NOTHING
             self._flow.state = replace(state, prepared=prepared)
+        elif variable.name in MODAL:
+            told = "".join(token.text.lower() for token in reader.rest())
+            self._flow.state = self._frames.oriented(state, variable.name, f"={told}" if whole else told)
         elif not whole:
             return
         elif variable.name == "$ipo_mode":
@@ -304,7 +318,7 @@ class KrlReading:
         found = reader.rest()
         words = [token.text.lower() for token in found]
         before = self._flow.state
-        self._flow.state = self._with(found)
+        self._flow.state = self._with(found).along(motion)
         blended = passing or self._in_spline or bool(BLENDING & set(words))
         kinds = [Motion.VIA, Motion.CIRCULAR] if motion == Motion.CIRCULAR else [motion]
         for number, (kind, chain) in enumerate(zip(kinds, chains, strict=True)):
@@ -312,7 +326,7 @@ class KrlReading:
                 self._storage.read |= names_in([token for part in _parts(whole)[number:] for token in part])
         if "with" in words:
             self._storage.read |= names_in(found[words.index("with") :])
-        if ANGLE in words:
+        if ANGLE in words or self._flow.state.orientation.unheeded:
             self._flow.jump()
         self._flow.state = before
         self._after_interrupts()
@@ -324,7 +338,7 @@ class KrlReading:
         if "with" not in words:
             return state
         for part in _parts(found[words.index("with") + 1 :]):
-            if not part or part[0].text.lower() not in SETTING:
+            if not part or part[0].text.lower() not in SETTING | MODAL:
                 continue
             text = "".join(token.text.lower() for token in part if token.text.lower() not in BLENDING)
             kind = next((one for one, pattern in OWN.items() if pattern.fullmatch(text)), "")
@@ -336,6 +350,8 @@ class KrlReading:
                 state = state.set(text[1:5], unknown)
             elif text.startswith("$ipo_mode="):
                 state = replace(state, remote=remote(text.partition("=")[2]))
+            elif text.startswith("$ori_type="):
+                state = self._frames.oriented(state, "$ori_type", text.removeprefix("$ori_type"))
         return state
 
     def _go(self, place: tuple[int, int], chain: Operands | None, motion: Motion, *, blended: bool) -> bool:
@@ -347,7 +363,10 @@ class KrlReading:
             self._flow.jump()
             return False
         numbers, which = found
-        environment = self._found.environments.number(self._environment(chain, which))
+        meant, unheeded = self._environment(chain, which), self._flow.state.orientation.unheeded
+        if unheeded and not meant.why_not_poses:
+            self._found.keep(numbers, unheeded)
+        environment = self._found.environments.number(meant)
         for number in numbers:
             follows = self._flow.certain and len(numbers) == 1
             self._found.moves.add(

@@ -7,7 +7,8 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
-from truearm.programs.krl_storage import ASSIGNING, HEADER, is_data, lines
+from truearm.programs.krl_orientation import HEEDING, MODAL
+from truearm.programs.krl_storage import HEADER, is_data, lines
 from truearm.programs.krl_values import line_reader
 from truearm.programs.lexing import Token
 from truearm.programs.source import Source
@@ -39,6 +40,8 @@ LEAVING: Final = COMPUTING | _words(
 """Routines of KUKA that change neither tool nor base and do not move the arm; BAS is read for itself."""
 BAS_LEAVING: Final = frozenset({"acc_cp", "acc_ptp", "acc_glue", "cp_dat", "ptp_dat", "vel_cp", "vel_ptp"})
 """Commands of BAS that set neither tool nor base."""
+BAS_ORIENTING: Final = frozenset({"cp_dat", "cp_params", ""})
+"""Commands of BAS that set $ORI_TYPE, and what may be one of them."""
 DOING_LATER: Final = frozenset({"trigger", "interrupt", "global"})
 """First words of statements that say what an interrupt or a trigger does."""
 SETTING: Final = frozenset({"$tool", "$base", "$ipo_mode", "$load", "fdat_act"})
@@ -84,7 +87,7 @@ def immediate(found: list[Token]) -> tuple[list[Token], list[Token]]:
 
 def set_later(later: Sequence[Token]) -> bool:
     """Whether what an interrupt or a trigger does is to set what stays until it is changed."""
-    return len(later) > 1 and later[1].text.lower() in SETTING
+    return len(later) > 1 and later[1].text.lower() in SETTING | MODAL
 
 
 def bas_command(words: Sequence[str]) -> tuple[str, str]:
@@ -96,6 +99,24 @@ def bas_command(words: Sequence[str]) -> tuple[str, str]:
     return command, number
 
 
+def _sets_frames(words: Sequence[str]) -> bool:
+    """Whether a statement, whose tokens are in small letters, sets tool, base, or what BAS sets them to."""
+    return bas_command(words)[0] not in BAS_LEAVING if words[0] == "bas" else words[0] in SETTING
+
+
+def _orients(words: Sequence[str]) -> bool:
+    """Whether a statement makes that orientations may not count, or that BAS makes so."""
+    if words[0] == "bas":
+        return bas_command(words)[0] in BAS_ORIENTING
+    return words[0] in MODAL and words[-1] not in HEEDING
+
+
+FRAMES: Final = "frames"
+ORIENTATION: Final = "orientation"
+SUBJECTS: Final = {FRAMES: _sets_frames, ORIENTATION: _orients}
+"""What routines may leave as it is, and which statements set it."""
+
+
 class Routines:
     """The routines of a program."""
 
@@ -104,7 +125,7 @@ class Routines:
         self._all = [routine for file in self._programs() for routine in self._of(file)]
         self._by_name = {routine.name: routine for routine in self._all if routine.name}
         self._by_place = {(routine.file, routine.start): routine for routine in self._all if routine.name}
-        self._leaving: dict[str, bool] = {}
+        self._leaving: dict[str, dict[str, bool]] = {subject: {} for subject in SUBJECTS}
         self._wandering: dict[Routine, bool] = {}
 
     def _programs(self) -> list[int]:
@@ -140,44 +161,46 @@ class Routines:
         mention = re.compile(rf"(?<![\w$]){re.escape(routine.name)}[ \t]*\(", re.IGNORECASE)
         return not routine.visible and mention.search(source.text, behind) is None
 
-    def leaves(self, name: str) -> bool:
-        """Whether a call of a routine certainly leaves tool and base as they are."""
+    def leaves(self, name: str, subject: str = FRAMES) -> bool:
+        """Whether a call of a routine certainly leaves tool and base, or another subject, as they are."""
         if name not in self._by_name:
             return name in LEAVING
-        if name not in self._leaving:
-            self._follow(name)
-        return self._leaving[name]
+        if name not in self._leaving[subject]:
+            self._follow(name, subject)
+        return self._leaving[subject][name]
 
-    def _follow(self, name: str) -> None:
-        """Find out of a routine, and of those that it calls, whether they leave tool and base as they are."""
+    def _follow(self, name: str, subject: str) -> None:
+        """Find out of a routine, and of those that it calls, whether they leave a subject as it is."""
         callers: dict[str, set[str]] = {}
-        followed, pending = set[str](), [name]
+        followed, pending, leaving = set[str](), [name], self._leaving[subject]
         while pending:
             one = pending.pop()
-            if one not in followed and one not in self._leaving:
+            if one not in followed and one not in leaving:
                 followed.add(one)
                 routine = self._by_name[one]
                 for inner in {
-                    each for place in self._body(routine) for each in self._runs(routine.file, *place)
+                    each
+                    for place in self._body(routine)
+                    for each in self._runs(routine.file, *place, subject)
                 }:
                     callers.setdefault(inner, set()).add(one)
                     pending += [inner] if inner in self._by_name else []
-        setting = [one for one in callers if one not in followed and not self.leaves(one)]
-        self._leaving |= dict.fromkeys(followed, True)
+        setting = [one for one in callers if one not in followed and not self.leaves(one, subject)]
+        leaving |= dict.fromkeys(followed, True)
         while setting:
-            changed = [one for one in callers.get(setting.pop(), ()) if self._leaving[one]]
-            self._leaving |= dict.fromkeys(changed, False)
+            changed = [one for one in callers.get(setting.pop(), ()) if leaving[one]]
+            leaving |= dict.fromkeys(changed, False)
             setting += changed
 
     def wanders(self, file: int, at: int) -> bool:
-        """Whether the routine around a label sets tool or base where a GOTO may lead around it."""
+        """Whether the routine around a label sets what stays where a GOTO may lead around it."""
         routine = next(one for one in self._all if one.file == file and one.start <= at < one.end)
         if routine not in self._wandering:
             jumped, found = False, False
             for place in self._body(routine):
                 words = self._words(file, *place)
                 jumped |= words[:1] == ["goto"] or words[1:2] == [":"]
-                found |= jumped and self._sets(file, *place)
+                found |= jumped and (not MODAL.isdisjoint(words[:1]) or self._sets(file, *place))
             self._wandering[routine] = found
         return self._wandering[routine]
 
@@ -208,20 +231,20 @@ class Routines:
 
     def _sets(self, file: int, start: int, end: int) -> bool:
         """Whether a line may set what stays until it is changed."""
-        return not all(self.leaves(name) for name in self._runs(file, start, end))
+        return any(
+            not self.leaves(name, subject)
+            for subject in SUBJECTS
+            for name in self._runs(file, start, end, subject)
+        )
 
-    def _runs(self, file: int, start: int, end: int) -> set[str]:
-        """Names of the routines that a line calls; an empty one where it sets itself what stays."""
-        source = self._sources[file]
-        found = line_reader(source, start, end).rest()
+    def _runs(self, file: int, start: int, end: int, subject: str) -> set[str]:
+        """Names of the routines that a line calls; an empty one where it sets a subject itself."""
+        found = line_reader(self._sources[file], start, end).rest()
         words = [token.text.lower() for token in found]
         if not words or words[0] in EXTERNAL:
             return set()
-        if words[0] == "bas" and bas_command(words)[0] not in BAS_LEAVING:
-            return {""}
-        assigned = ASSIGNING.match(source.text, start, end) is not None and words[0] in SETTING
-        assigned |= set_later(immediate(found)[1])
-        return {*called(found), *([""] if assigned else [])}
+        sets = SUBJECTS[subject](words) or set_later(immediate(found)[1])
+        return {*called(found), *([""] if sets else [])}
 
 
 def _arguments(found: list[Token]) -> set[str]:

@@ -10,10 +10,20 @@ import numpy as np
 from truearm.programs.environment import Frame
 from truearm.programs.frames import KRL_WORLD, Frames, name_at_start, written_out
 from truearm.programs.krl_order import Order
+from truearm.programs.krl_orientation import (
+    HEEDED,
+    LINE_DATA,
+    USUAL,
+    Orientation,
+    mode_of,
+    named_in,
+    unheeded_in,
+)
 from truearm.programs.krl_routines import Routines
 from truearm.programs.krl_storage import WORLD_SET_BY, KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
+from truearm.programs.tables import Motion
 from truearm.types import Transform
 
 REMOTE: Final = "the workpiece is on the arm and the tool stands still (#TCP)"
@@ -23,7 +33,7 @@ CALLERS: Final = "it is the one that the callers of this routine have set"
 INTERRUPTED: Final = "an interrupt or a trigger may have set another"
 JUMPED: Final = "a GOTO may come here with another"
 GIVEN: Final = "is given to a subroutine, which may change it"
-ROUND_AGAIN: Final = "a loop comes round to it with another tool or base"
+ROUND_AGAIN: Final = "a loop comes round to it with another tool, base or $ORI_TYPE"
 KINDS: Final = {"tool": "TOOL_DATA", "base": "BASE_DATA"}
 PARTS: Final = (*KINDS, "mode")
 
@@ -55,6 +65,7 @@ class Modal:
         remote: Why nothing can be changed with it.
         load_kg: Mass of $LOAD, if the program says it.
         prepared: What FDAT_ACT holds.
+        orientation: Whether the orientation of targets counts.
     """
 
     tool: Frame
@@ -62,20 +73,26 @@ class Modal:
     remote: str = ""
     load_kg: float | None = None
     prepared: FrameData = NOTHING
+    orientation: Orientation = HEEDED
 
     def same(self, other: "Modal") -> bool:
         """Whether nothing differs."""
-        mine = (self.tool.key, self.base.key, self.remote, self.load_kg)
-        return mine == (other.tool.key, other.base.key, other.remote, other.load_kg)
+        mine, others = (
+            (one.tool.key, one.base.key, one.remote, one.load_kg, one.orientation) for one in (self, other)
+        )
+        return mine == others
 
     def overruled(self, before: "Modal", again: "Modal") -> bool:
-        """Whether a tool or base that is known here, in a loop, is another one when it comes round again."""
+        """Whether a tool, a base or a mode that is known here, in a loop, is another one when it comes round
+        again.
+        """
         known = [
             (mine.key, was.key, now.key)
             for mine, was, now in ((self.tool, before.tool, again.tool), (self.base, before.base, again.base))
             if not mine.unknown
         ]
-        parts = [*known, (self.remote, before.remote, again.remote)]
+        modes = [(one.remote, one.orientation.unheeded) for one in (self, before, again)]
+        parts = [*known, *zip(*modes, strict=True)]
         return any(mine == was != now for mine, was, now in parts)
 
     def joined(self, other: "Modal") -> "Modal":
@@ -86,12 +103,32 @@ class Modal:
             self.remote or other.remote,
             self.load_kg if self.load_kg == other.load_kg else None,
             self.prepared if self.prepared == other.prepared else NOTHING,
+            self.orientation.joined(other.orientation, DIFFERS),
         )
 
     def lost(self, why: str) -> "Modal":
+        """The state where neither tool nor base is known any more, nor whether orientations count."""
+        return self.without_frames(why).disoriented(why)
+
+    def without_frames(self, why: str) -> "Modal":
         """The state where neither tool nor base is known any more."""
         tool, base = (Frame.missing(f"{kind}: {why}") for kind in KINDS)
         return replace(self, tool=tool, base=base, prepared=NOTHING)
+
+    def disoriented(self, why: str) -> "Modal":
+        """The state where it is not known any more whether the orientation of targets counts."""
+        return replace(self, orientation=Orientation.lost(why))
+
+    def unprepared(self) -> "Modal":
+        """The state where it is not known what inline forms have prepared."""
+        lost = Orientation.lost(DIFFERS)
+        orientation = self.orientation._replace(line_data=lost.line_data)
+        return replace(self, prepared=NOTHING, orientation=orientation)
+
+    def along(self, motion: Motion) -> "Modal":
+        """The state as far as it matters for a motion: those joint by joint always heed orientations."""
+        joints = self.orientation._replace(unheeded=None)
+        return replace(self, orientation=joints) if motion == Motion.JOINT else self
 
     def set(self, kind: str, frame: Frame) -> "Modal":
         """The state with another "tool" or "base"."""
@@ -213,6 +250,37 @@ class KrlFrames:
             return state
         text = self._sources[file].text[value.at : value.end].lower()
         return replace(state, remote=remote("#tcp" if re.search(r"ipo_frame\s*#tcp", text) else ""))
+
+    def oriented(self, state: Modal, name: str, told: str) -> Modal:
+        """The state behind an assignment to $ORI_TYPE or LDAT_ACT.
+
+        Args:
+            state: The state before it.
+            name: Which of them.
+            told: What stands behind the name, without blanks and in small letters.
+        """
+        before, value = state.orientation, told.partition("=")[2]
+        if name != LINE_DATA:
+            data = named_in(value)
+            found = self._by_line_data(data) if data else unheeded_in(value)
+            return replace(state, orientation=before if found is None else before._replace(unheeded=found))
+        if told.startswith("."):
+            found = unheeded_in(value) if told.startswith(".ori_typ=") else None
+        else:
+            found = self._by_line_data(value)
+        return replace(state, orientation=before if found is None else before._replace(line_data=found))
+
+    def _by_line_data(self, told: str) -> str | None:
+        """What line data, by name or written out, make of `unheeded`; None where they leave it."""
+        if told == USUAL:
+            return ""
+        if not told.startswith("{"):
+            name, file, value = self.frame_data(told)
+            if value is None:
+                return f"$ORI_TYPE: {name} does not tell it in this program"
+            told = self._sources[file].text[value.at : value.end].lower()
+        mode = mode_of(told)
+        return None if mode is None else unheeded_in(mode)
 
     def evaluated(self, kind: str, found: Operands | None) -> Frame:
         """A tool or base from operands joined by the geometric operator."""

@@ -52,11 +52,28 @@ _BRANCHING: Final = (
 )
 _CALLING: Final = re.compile(r"\s*(CallP|RelM)\b", re.IGNORECASE)
 """What lets another program set tool and base."""
+_GETTING: Final = re.compile(r"\s*GetM\b\s*(.*?)\s*\Z", re.IGNORECASE)
+_LOSING: Final = {
+    "callp": "the program called in line {line} may have set another {kind}",
+    "relm": "RelM in line {line} lets another program have the arm, which may set another {kind}",
+    "getm": "GetM in line {line} changes the mechanism, and its {kind} is not known until it is set again",
+}
+"""Why tool or base are not known behind a statement."""
+_CORRECTED: Final = "1"
+"""Number of the mechanism that is corrected: the arm itself, which a program has from the start."""
 _SET_BY: Final[Mapping[Kind, tuple[str, ...]]] = {"tool": ("tool", "m_tool"), "base": ("base",)}
 _NUMBERED: Final = "M_Tool="
 _SKIPPED: Final = re.compile(r"(?<![\w.])Skip\b", re.IGNORECASE)
 COMPUTED: Final = "its target is computed when the program runs"
 RELATIVE: Final = "it is a relative move"
+OF_ANOTHER: Final = (
+    "in line {line} it is a place of the mechanism that GetM gets in line {getting}, and mechanism 1 is "
+    "corrected"
+)
+ABOUT_CENTRE: Final = (
+    "it is used in line {line} by Mvr3, whose start and end have to be equally far from its centre, within "
+    "0.01 mm: to have it corrected, use Mvr with a point of the arc"
+)
 NOT_CONSTANT: Final = "its target is not a constant of this file"
 
 
@@ -81,6 +98,13 @@ class Reader:
         self._branching = re.compile(rf"(?<![\w.])({words})\b", re.IGNORECASE)
         ways = Ways(self._statements)
         self._jumped_to = ways.jumped_to()
+        self._getting = {
+            place: getting.group(1)
+            for place, one in enumerate(self._statements)
+            if (getting := _GETTING.match(one.text)) is not None
+        }
+        self._of_others = self._find_others(ways)
+        self._losing = self._find_losing()
         self._settings = {kind: self._find_settings(kind) for kind in _SET_BY}
         texts = (name_of(text) for text in self._settings["tool"].values())
         self._written = written_out("tool", (text for text in texts if text.startswith("(")))
@@ -88,8 +112,11 @@ class Reader:
         self._tools = self._set_at("tool", frames.at_start("tool", start), ways)
         self._bases = self._set_at("base", IDENTITY, ways)
         self._blended, self._follows, self._in_branch = False, False, False
+        self._gone_to, self._centres = set[int](), list[tuple[str, str]]()
         for place in range(len(self._statements)):
             self._statement(place)
+        for centre, reason in self._centres:
+            self.found.keep(self._gone_to.intersection(self._targets_in(centre)), reason)
 
     def _target(self, name: str, variable: Variable) -> int:
         """The number of the last target added: one for each constant of the variable."""
@@ -126,8 +153,7 @@ class Reader:
         settings: dict[str, list[int]] = {}
         for place, text in self._settings[kind].items():
             settings.setdefault(name_of(text), []).append(place)
-        calls = [place for place, one in enumerate(self._statements) if _CALLING.match(one.text) is not None]
-        ends = {*self._settings[kind], *calls}
+        ends = {*self._settings[kind], *self._losing}
         unsure = Frame.missing(f"which {kind} is set here depends on how the program runs")
         found: dict[int, Frame] = dict.fromkeys(self._moves.keys() & ways.from_start(ends), start)
         for places in settings.values():
@@ -135,15 +161,40 @@ class Reader:
             frame = self._stated_tool(given) if kind == "tool" else self._stated_base(given)
             for place in self._moves.keys() & ways.behind(places, ends):
                 found[place] = unsure if place in found else frame
-        for call in calls:
-            line = self._source.place(self._statements[call].at)[0]
-            called = Frame.missing(f"the program called in line {line} may have set another {kind}")
-            found |= dict.fromkeys(self._moves.keys() & ways.behind([call], ends), called)
+        for place, why in self._losing.items():
+            lost = Frame.missing(why.format(line=self._line_of(place), kind=kind))
+            found |= dict.fromkeys(self._moves.keys() & ways.behind([place], ends), lost)
         if kind == "base":
             found |= dict.fromkeys(self._tracked(ways), Frame.missing("a conveyor is tracked there (Trk On)"))
         elsewhere = list({id(frame): frame for frame in found.values()}.values())
         only = elsewhere[0] if len(elsewhere) == 1 else unsure
         return dict.fromkeys(self._moves, only) | found
+
+    def _find_others(self, ways: Ways) -> dict[int, int]:
+        """Statements that may be executed while the program has another mechanism, with the GetM of it."""
+        return {
+            place: getting
+            for getting, number in self._getting.items()
+            if number != _CORRECTED
+            for place in ways.behind([getting], self._getting)
+        }
+
+    def _find_losing(self) -> dict[int, str]:
+        """Statements behind which tool and base are not known, and why."""
+        called = {
+            place: _LOSING[calling.group(1).casefold()]
+            for place, one in enumerate(self._statements)
+            if (calling := _CALLING.match(one.text)) is not None
+        }
+        changing = (
+            place
+            for place, number in self._getting.items()
+            if number != _CORRECTED or place in self._of_others
+        )
+        return called | dict.fromkeys(changing, _LOSING["getm"])
+
+    def _line_of(self, place: int) -> int:
+        return self._source.place(self._statements[place].at)[0]
 
     def _tracked(self, ways: Ways) -> set[int]:
         """Motions while a conveyor may be tracked."""
@@ -203,6 +254,7 @@ class Reader:
     def _motion(self, place: int, move: Move) -> None:
         word = move.word.casefold()
         line = self._source.place(move.at)[0]
+        self._keep_beside(place, move)
         if word not in _KINDS:
             why = f"{move.word} is not followed: the tool stands still, or it is a relative move"
             self.found.leave((0, move.at), why)
@@ -230,6 +282,18 @@ class Reader:
             environment = self._environment(place, before, after @ offset, problem)
             self._go(move.at, target, kind, environment)
             self._follows = not problem and _SKIPPED.search(move.added) is None
+        self._follows = self._follows and place not in self._of_others
+
+    def _keep_beside(self, place: int, move: Move) -> None:
+        """Places of another mechanism, and of arcs about a centre, which no correction may shift."""
+        line = self._source.place(move.at)[0]
+        if place in self._of_others:
+            getting = self._line_of(self._of_others[place])
+            self._keep(move.pieces, OF_ANOTHER.format(line=line, getting=getting))
+        if move.word.casefold() == "mvr3":
+            reason = ABOUT_CENTRE.format(line=line)
+            self._keep(move.pieces[:2], reason)
+            self._centres += [(centre, reason) for centre in move.pieces[2:3]]
 
     def _environment(self, place: int, before: Transform, after: Transform, problem: str) -> Environment:
         tool = self._tools[place]
@@ -243,6 +307,8 @@ class Reader:
         )
 
     def _go(self, at: int, target: int, kind: Motion, environment: Environment) -> None:
+        if kind != Motion.BESIDE:
+            self._gone_to.add(target)
         self.found.moves.add(
             target,
             (0, at),
@@ -253,10 +319,17 @@ class Reader:
         )
 
     def _keep(self, pieces: Sequence[str], reason: str) -> None:
-        """Variables in pieces of a motion that is not certain cannot be changed."""
-        for name in (name for piece in pieces for name in self._variables.named(piece)):
-            own = [self._targets[name]] if name in self._targets else self._elements.get(name, ())
-            self.found.keep(own, reason)
+        """Variables in pieces of a motion cannot be changed with certainty."""
+        for piece in pieces:
+            self.found.keep(self._targets_in(piece), reason)
+
+    def _targets_in(self, piece: str) -> list[int]:
+        """The targets of variables in a piece of a motion; those of an array where an index is computed."""
+        found = (
+            [self._targets[name]] if name in self._targets else self._elements.get(name, [])
+            for name in self._variables.named(piece)
+        )
+        return [target for targets in found for target in targets]
 
     def _place(self, piece: str) -> tuple[int, Transform, Transform] | str:
         """Target and what is before and after it; or why it is not known."""

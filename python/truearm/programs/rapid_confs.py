@@ -1,18 +1,21 @@
-r"""Where ConfJ and ConfL are off in a RAPID module.
+r"""Where ConfJ and ConfL are off in a RAPID module, and where SingArea locks axis 4.
 
 A motion behind ConfJ \Off or ConfL \Off goes to the configuration nearest to where the arm stands, whatever
-the configuration data of its target says. What is set stays until it is set again, through calls too.
+the configuration data of its target says. Lines and arcs behind SingArea \LockAxis4 keep axis 4 at 0 or
+180 deg, whatever orientation their target states. What is set stays until it is set again, through calls too.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from truearm.programs.rapid_instructions import SETTINGS
 from truearm.programs.rapid_routines import READING
 
 ON, OFF, START = "on", "off", "start"
 """What holds; START for what held at the routine's beginning."""
 KINDS: Final = ("confj", "confl")
+LOCKING: Final = "singarea"
 ANYTIME: Final = frozenset({"trap", "func"})
 MAIN: Final = "main"
 KEEPING: Final = READING | {
@@ -20,7 +23,7 @@ KEEPING: Final = READING | {
     "iwatch", "open", "softact", "softdeact", "tpreadfk", "tpreadnum", "triggequip", "triggint", "triggio",
     "waitai", "waitdo", "waitgi", "waitgo", "write",
 }  # fmt: skip
-"""Instructions of the controller that set neither; others may be routines of other modules."""
+"""Instructions of the controller that set none of them; others may be routines of other modules."""
 Values = frozenset[str]
 NOTHING: Final[Values] = frozenset()
 ANY: Final[Values] = frozenset({ON, OFF})
@@ -48,7 +51,8 @@ class Confs:
     def __init__(self) -> None:
         self._routines: dict[str, _Routine] = {}
         self._here = _Routine("")
-        self._handling = self._anytime = False
+        self._handling = False
+        self._anytime: set[str] = set()
 
     def begin(self, word: str, name: str) -> None:
         """A routine, or a module, begins."""
@@ -62,29 +66,35 @@ class Confs:
         self._here.steps.append(_Step(kind, name))
 
     def set(self, word: str, options: Iterable[str]) -> None:
-        r"""ConfJ or ConfL, with the names of its options: on without any."""
-        self._anytime |= self._handling or self._here.word in ANYTIME
-        self._here.steps.append(_Step(OFF if OFF in options else ON, word))
+        r"""One of SETTINGS, with the names of its options: on without any."""
+        if self._handling or self._here.word in ANYTIME:
+            self._anytime.add(word)
+        self._here.steps.append(_Step(OFF if SETTINGS[word] in options else ON, word))
 
     def motion(self, kind: str, number: int) -> None:
-        """A motion of which one of KINDS decides."""
+        """A motion of which one of SETTINGS decides."""
         self._here.steps.append(_Step("motion", kind, number))
 
     def nearest(self) -> dict[int, bool]:
         """Motions that go to the nearest configuration, by number; False where that is not certain."""
-        found: dict[int, bool] = {}
-        for kind in KINDS:
-            if any(step[:2] == (OFF, kind) for one in self._routines.values() for step in one.steps):
-                values = self._values(kind)
-                found |= {number: ON not in held for number, held in values.items() if OFF in held}
-        return found
+        return {number: certain for kind in KINDS for number, certain in self._off(kind).items()}
+
+    def locked(self) -> frozenset[int]:
+        """Motions, by number, on which axis 4 may be locked."""
+        return frozenset(self._off(LOCKING))
+
+    def _off(self, kind: str) -> dict[int, bool]:
+        """Motions for which `kind` is off, by number; False where it may be on as well."""
+        if not any(step[:2] == (OFF, kind) for one in self._routines.values() for step in one.steps):
+            return {}
+        return {number: ON not in held for number, held in self._values(kind).items() if OFF in held}
 
     def _values(self, kind: str) -> dict[int, Values]:
         """What may hold at each motion that `kind` decides of."""
         ways = self._ways(kind)
         entries = self._entries(ways)
         return {
-            number: ANY if self._anytime else _given(held, entries[name])
+            number: ANY if kind in self._anytime else _given(held, entries[name])
             for name, way in ways.items()
             for number, held in way.motions.items()
         }

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Final
 
 from truearm.programs.lexing import Token, tokens
-from truearm.programs.rapid_instructions import COUNTING, HARMLESS
+from truearm.programs.rapid_instructions import COUNTING, HARMLESS, SETTINGS
 from truearm.programs.rapid_values import OPERATORS, TOKENS
 from truearm.programs.source import Source
 
@@ -50,7 +50,7 @@ _FUNCTION: Final = re.compile(
     re.IGNORECASE | re.MULTILINE | re.DOTALL,
 )
 _STORAGE: Final = frozenset({"var", "const", "pers"})
-_QUIET: Final = (HARMLESS - {"gripload", "confj", "confl"}) | COUNTING | _STORAGE | NO_FUNCTIONS | {
+_QUIET: Final = (HARMLESS - {"gripload", *SETTINGS}) | COUNTING | _STORAGE | NO_FUNCTIONS | {
     "then", "else", "endif", "for", "do", "endfor", "endwhile", "default", "endtest", "error", "undo",
     "retry", "trynext", "raise", "true", "false",
 }  # fmt: skip

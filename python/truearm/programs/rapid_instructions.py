@@ -64,6 +64,8 @@ HARMLESS: Final = frozenset(
         "gripload",
     }
 )
+SETTINGS: Final = {"confj": "off", "confl": "off", "singarea": "lockaxis4"}
+"""Of these what decides how targets are meant, and the option with which they mean something else."""
 COUNTING: Final = frozenset({"incr", "decr", "add", "clear"})
 """Harmless but for what they are given."""
 MOVING: Final = ("move", "search", "trigg", "arc", "spot", "disp", "paint")

@@ -17,7 +17,7 @@ from truearm.programs.layouts import Joints, QuaternionPose
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Program
 from truearm.programs.rapid_configuration import Confdata
-from truearm.programs.rapid_confs import KINDS, Confs
+from truearm.programs.rapid_confs import KINDS, LOCKING, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
 from truearm.programs.rapid_functions import called, harmless
@@ -26,6 +26,7 @@ from truearm.programs.rapid_instructions import (
     HARMLESS,
     INSTRUCTIONS,
     MOVING,
+    SETTINGS,
     Instruction,
     motions_named,
 )
@@ -63,6 +64,10 @@ JUMPS: Final = frozenset({"return", "raise", "exit", "exitcycle", "stop", "retry
 CLOSING: Final = frozenset({"endif", "endfor", "endwhile", "endtest"})
 READ: Final = "the program computes with it"
 PASSED: Final = "it is given to an instruction or routine that is not known here"
+LOCKED: Final = (
+    r"axis 4 is locked there, or may be (SingArea \LockAxis4), so that the arm does not take the target's "
+    r"orientation: to have it corrected, go there behind SingArea \Wrist or \Off"
+)
 DISPLACED: Final = "a program displacement (PDispOn, PDispSet, EOffs) may be active"
 
 
@@ -265,7 +270,7 @@ class RapidReading:
 
     def _call(self, at: int, word: str, found: Sequence[Token]) -> None:
         self._mention(found[1:], PASSED, "" if word in JUMPS | HARMLESS else word)
-        if word in KINDS:
+        if word in SETTINGS:
             self._confs.set(word, {token.text.lower() for token in found[1:]})
         elif word in JUMPS:
             self._flow.jump()
@@ -346,6 +351,8 @@ class RapidReading:
         flow = self._flow
         follows = flow.certain and len(meant.targets) == 1
         self._confs.motion(KINDS[motion != Motion.JOINT], len(self._uses))
+        if motion != Motion.JOINT:
+            self._confs.motion(LOCKING, len(self._uses))
         self._uses.append(_Use(at, motion, meant, tool, flow.state, passed, follows))
         for number in meant.targets:
             self._used.append(number)
@@ -364,10 +371,12 @@ class RapidReading:
 
     def _move(self) -> None:
         """The moves, once it is known which tools and work objects stay what they are."""
-        nearest = self._confs.nearest()
+        nearest, locked = self._confs.nearest(), self._confs.locked()
         for number, use in enumerate(self._uses):
             problem = self._targets.doubt(use.meant.targets, heeded=nearest.get(number) is not True)
             environment = self._found.environments.number(self._environment(use, problem))
+            if number in locked:
+                self._found.keep(use.meant.targets, LOCKED)
             for target in use.meant.targets:
                 if number in nearest:
                     self._found.nearest[len(self._found.moves)] = nearest[number]
@@ -377,7 +386,7 @@ class RapidReading:
                     use.motion,
                     environment=environment,
                     blended=use.passed,
-                    follows=use.follows,
+                    follows=use.follows and number - 1 not in locked,
                 )
 
     def _environment(self, use: _Use, problem: str) -> Environment:

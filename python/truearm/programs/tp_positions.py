@@ -23,6 +23,7 @@ _FRAME: Final = re.compile(r"\b(UF|UT)\s*:\s*(\d+|F)\b")
 _CONFIG: Final = re.compile(
     r"\bCONFIG\s*:\s*'\s*(\w)\s*(\w)\s*(\w)\s*,\s*([+-]?\d+)\s*,\s*([+-]?\d+)\s*,\s*([+-]?\d+)\s*'"
 )
+_NO_GROUP: Final = "it has no motion group 1 (GP1), whose arm is corrected"
 _NO_CONFIG: Final = (
     f"its CONFIG is not three letters N/F U/D T/B and three turn numbers of at most {MOST_TURNS}"
 )
@@ -104,13 +105,14 @@ def position_text(source: Source, at: int) -> str | None:
 
 
 def _position(text: str, found: re.Match[str], joint_count: int) -> Position:
-    start, end = _first_group(text, *found.span(2))
+    group = _first_group(text, *found.span(2))
+    start, end = group or (0, 0)
     fields = {one.group(1): one for one in _FIELD.finditer(text, start, end)}
     frames = {one.group(1): one.group(2) for one in _FRAME.finditer(text, start, end)}
     config = _CONFIG.search(text, start, end)
     cartesian = any(name in fields for name in _CARTESIAN)
     names = list(_CARTESIAN) if cartesian else [f"J{joint + 1}" for joint in range(joint_count)]
-    problem = _problem(fields, names, joint_count)
+    problem = _NO_GROUP if group is None else _problem(fields, names, joint_count)
     width = len(names) + (len(LETTERS) + 3 if cartesian else 0)
     numbers: tuple[Number, ...] = (ABSENT,) * width
     if not problem:
@@ -129,13 +131,13 @@ def _position(text: str, found: re.Match[str], joint_count: int) -> Position:
     )
 
 
-def _first_group(text: str, start: int, end: int) -> tuple[int, int]:
-    """The part of a position that is of motion group 1: all where no group is named."""
+def _first_group(text: str, start: int, end: int) -> tuple[int, int] | None:
+    """The part of a position that is of motion group 1: all where no group is named; None without it."""
     marks = list(_GROUP.finditer(text, start, end))
     for mark, behind in zip(marks, [*marks[1:], None], strict=False):
         if mark.group(1) == "1":
             return mark.end(), end if behind is None else behind.start()
-    return (start, end) if not marks else (end, end)
+    return (start, end) if not marks else None
 
 
 def _problem(fields: dict[str, re.Match[str]], names: list[str], joint_count: int) -> str:
