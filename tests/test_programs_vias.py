@@ -15,6 +15,7 @@ from tests.test_programs_urscript import UR, pose_text
 from truearm.inverse import Inverse
 from truearm.programs.arcs import Arc
 from truearm.programs.densify import Spacing
+from truearm.programs.following import UNFOLLOWED
 from truearm.programs.krl import KRL
 from truearm.programs.program import numbers_of
 from truearm.programs.rapid import RAPID
@@ -276,6 +277,29 @@ def near_flange(robot, arc):
     flanges = np.array(arc.tools)
     flanges[:, :3, 3] += (flange(robot, arc.q[0])[0] - arc.tools[0])[:3, 3]
     return np.stack([Inverse(robot).near(one[None], arc.q[0][None])[0] for one in flanges])
+
+
+def half_circle(robot, start):
+    """Half a circle on which the tool turns with the path, by half a turn."""
+    first = (flange(robot, start) @ TOOL)[0]
+    degrees = [0.0, 72.0, 180.0]
+    tools = np.stack([on_circle(first, np.deg2rad(angle), angle) for angle in degrees])
+    q, found = np.array(start), []
+    for angle in np.arange(0.0, 181.0, 4.0):
+        (q,) = near(robot, on_circle(first, np.deg2rad(angle), angle)[None], q)
+        found += [q] if angle in degrees else []
+    return SimpleNamespace(tools=tools, passed=tools[1], q=np.stack(found), robot=robot)
+
+
+def test_which_way_round_a_tool_turns_by_half_a_turn_is_told_by_a_path_that_it_turns_with():
+    turning = half_circle(UNIVERSAL, np.array(DIALECTS["UR"][3]))
+    via, end = reasons(rewritten(UR, of_ur(turning), UNIVERSAL, by=BY))
+    assert "which leaves 144.0 deg open" in via[2]
+    assert end[2] == UNFOLLOWED
+    turning = half_circle(ABB, DIALECTS["RAPID"][3])
+    done = rewritten(RAPID(), of_rapid(turning), ABB, by=BY)
+    assert reasons(done) == []
+    np.testing.assert_allclose((flange(ABB, done.nominal) @ TOOL)[1], turning.passed, atol=1e-5)
 
 
 def test_how_far_an_arc_with_an_angle_turns_is_left_open():

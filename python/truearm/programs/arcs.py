@@ -12,6 +12,8 @@ from truearm.units import FULL_TURN
 
 FLAT: Final = 1e-5
 """Sine of the angle between chords of an arc below which its points count as in line."""
+NEARLY_RAD: Final = np.deg2rad(3.0)
+"""What half a turn may lack so that a tool may turn the other way round: ends are rounded, and corrected."""
 
 
 class Arc:
@@ -72,20 +74,25 @@ class Arc:
         """How the tool is turned at a share of the way, (3, 3), or at shares (n, 1), (n, 3, 3)."""
         return self._start[:3, :3] @ matrix_from_rotation_vector(share * self._turn)
 
+    def turned_either_way(self, share: float) -> list[Floats]:
+        """The same, (3, 3) each, both ways round where the tool turns by half a turn, or nearly."""
+        found = [self.turned(share)]
+        if self.turn_rad > np.pi - NEARLY_RAD:
+            found.append(self._start[:3, :3] @ matrix_from_rotation_vector(share * _other_way(self._turn)))
+        return found
+
     def turned_on_path(self, share: float) -> Floats:
         """The same where the tool turns evenly in a frame that goes round with the path.
 
-        Of the two ways round that nearer to `turned`: on half a circle and more between ends that are turned
-        alike the tool does not spin.
+        Of the two ways round that nearer to how it is turned otherwise: on half a circle and more between
+        ends that are turned alike the tool does not spin.
         """
-        back = self._gone(np.array([-1.0]))[0]
+        back, gone = self._gone(np.array([-1.0, share]))
         turn = rotation_vector_from_matrix(self._start[:3, :3].T @ back @ self.turned(1.0))
-        size = float(np.linalg.norm(turn))
-        ways = [turn] if size == 0.0 else [turn, turn * (1.0 - FULL_TURN / size)]
-        gone = self._gone(np.array([share]))[0] @ self._start[:3, :3]
-        found = [gone @ matrix_from_rotation_vector(share * way) for way in ways]
-        even = self.turned(share)
-        return min(found, key=lambda one: apart_rad(one, even))
+        ways = [turn, _other_way(turn)] if turn.any() else [turn]
+        found = [gone @ self._start[:3, :3] @ matrix_from_rotation_vector(share * way) for way in ways]
+        even = self.turned_either_way(share)
+        return min(found, key=lambda one: min(apart_rad(one, other) for other in even))
 
     def off_m(self, points: Floats) -> Floats:
         """How far points (n, 3) are from its circle, (n,)."""
@@ -94,6 +101,11 @@ class Arc:
         outside = np.linalg.norm(arms - beside[:, None] * self._axis, axis=1) - np.linalg.norm(self._arm)
         found: Floats = np.hypot(beside, outside)
         return found
+
+
+def _other_way(turn: Floats) -> Floats:
+    """A rotation vector (3,), not zero, that ends where `turn` does, the other way round."""
+    return turn * (1.0 - FULL_TURN / np.linalg.norm(turn))
 
 
 def apart_rad(one: Floats, other: Floats) -> float:

@@ -123,9 +123,11 @@ def _ways(way: Arc, share: float, rule: Via) -> tuple[Floats, ...]:
     """How the tool may be turned, (3, 3) each, at a share of an arc; the likely one first."""
     if rule == Via.OPEN:
         return way.turned(0.0), way.turned(1.0)
+    even = way.turned_either_way(share)
     if rule == Via.BETWEEN:
-        return (way.turned(share),)
-    return way.turned_on_path(share), way.turned(share)
+        return tuple(even)
+    on_path = way.turned_on_path(share)
+    return on_path, min(even, key=lambda one: apart_rad(one, on_path))
 
 
 class _Judge:
