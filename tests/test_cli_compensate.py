@@ -405,7 +405,7 @@ def test_a_path_gets_no_rows_and_says_so(capsys):
     words = ["compensate", "arm.calib", "two.csv", "--controller", "nominal", "-o", "two_out.csv"]
     assert main([*words, "--densify-mm", "0.0001", "--least-spacing-mm", "2"]) == 0
     told = " ".join(capsys.readouterr().err.split())
-    assert "1 linear move deviates by more than 0.0001 mm (--densify-mm)" in told
+    assert "1 move deviates by more than 0.0001 mm (--densify-mm)" in told
     assert "mm; a path gets no rows but its author's)" in told
 
 

@@ -233,7 +233,7 @@ def test_spline_motions_with_their_own_frames():
 def test_arrays_and_circles():
     points = [pose_text([a, -90, 90, 0, 45, 0]) for a in (0, 5, 10)]
     dat = "".join(f"PTS[{n}]={text}\n" for n, text in enumerate(points, start=1))
-    src = ALREADY + "PTP PTS[1]\nCIRC PTS[2],PTS[3],CA 90\nEND\n"
+    src = ALREADY + "PTP PTS[1]\nCIRC PTS[2],PTS[3]\nEND\n"
     done = rewritten(read("a.src", src, KUKA, dat="DECL E6POS PTS[3]\n" + dat), models(KUKA))
     assert done.changed.all()
     running = rewritten(

@@ -286,7 +286,7 @@ def test_what_is_not_alike_at_target_and_approach_leaves_the_target(body):
     [
         f"FOR i FROM 1 TO 3 DO\n{ABOVE}\nENDFOR",
         f"{ABOVE}\nMoveL pB,{GO}\nMoveL Offs(pA,0,0,40),{GO}",
-        f"MoveJ pB,{GO}\nMoveC Offs(pA,0,0,40),pA,{GO}",
+        f"MoveJ Offs(pA,20,0,30),{GO}\nMoveC Offs(pA,0,0,40),pA,{GO}",
     ],
     ids=["loop", "two", "arc"],
 )

@@ -174,7 +174,7 @@ def test_a_move_that_needs_more_waypoints_is_named_with_its_deviation():
     (notice,) = bent.notices
     assert (notice.kind, notice.rows) == ("deviation", (one["line"],))
     assert notice.message == (
-        "1 linear move deviates by more than 0.001 mm (--densify-mm), and waypoints could not be inserted "
+        "1 move deviates by more than 0.001 mm (--densify-mm), and waypoints could not be inserted "
         f"there: line {one['line']} ({one['deviation_mm']:.3g} mm; {one['reason']})"
     )
 
@@ -185,7 +185,7 @@ def test_the_first_moves_that_need_waypoints_are_named_and_the_others_counted():
     again_and_again = ",v100,fine,tG;\n    MoveL ".join(["p1", "p0"] * 4)
     done = rewritten(long_line(again_and_again), given, spacing=Spacing.of(0.001, 100.0))
     (notice,) = done.notices
-    assert notice.message.startswith("8 linear moves deviate by more")
+    assert notice.message.startswith("8 moves deviate by more")
     assert notice.message.count("line ") == 5
     assert notice.message.endswith("; and 3 more")
     assert len(report_of(done)["deviating"]) == len(notice.rows) == 8
@@ -205,9 +205,9 @@ def test_where_waypoints_are_refused_that_is_the_reason():
     done = rewritten(long_line(), given, spacing=Spacing.of(0.1, 10.0))
     (one,) = report_of(done)["deviating"]
     assert one["deviation_mm"] is None
-    assert one["reason"] == "waypoints between are refused: too far"
+    assert one["reason"] == "places between its ends are refused: too far"
     assert "deviates, or may, by more" in done.notices[0].message
-    assert "(how far is not known; waypoints between are refused: too far)" in done.notices[0].message
+    assert "(how far is not known; places between its ends are refused: too far)" in done.notices[0].message
 
 
 @pytest.mark.parametrize("target", ["Offs(p1,0,0,-20)", "RelTool(p1,0,0,20)"])

@@ -60,7 +60,7 @@ def stops(language, content, robot, frames=""):
 
 
 @pytest.mark.parametrize(("arc", "end"), [("Mvr2 P1,P2,P3", 1), ("Mvr P1,P3,P2", 1), ("Mvc P1,P2,P3", 0)])
-@pytest.mark.parametrize("first", ["Mov P3", "Mov P1"])
+@pytest.mark.parametrize("first", ["Mov P4", "Mov P1"])
 def test_a_line_behind_an_arc_begins_where_the_arc_ends(mitsubishi, arc, end, first):
     text = melfa(mitsubishi, first, "Mov P1", arc, "Mvs P4")
     done = rewritten(MELFA, text, mitsubishi, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)

@@ -94,7 +94,10 @@ def test_the_poses_mean_what_they_were_written_for(robot, sample):
     for number, name in targets.names.items():
         if name in wanted:
             assert np.abs(nominal[number] - wanted[name]).max() < 1e-7, name
-    assert np.abs(nominal[4:9] - PATH[1:6]).max() < 1e-7
+    assert np.abs(nominal[[4, 5, 6, 8]] - PATH[[1, 2, 3, 5]]).max() < 1e-7
+    via = robot.flange_chain.pose(robot.joints_from_readings(np.stack([nominal[7], PATH[4]])))[:, :3]
+    tips = via @ [0.0, 0.0, 0.1203, 1.0]
+    assert np.abs(tips[0] - tips[1]).max() < 1e-8, "of a via point movec heeds the position alone"
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])

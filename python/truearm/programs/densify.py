@@ -1,4 +1,4 @@
-"""Waypoints on long straight moves, where the arm's error varies between the ends."""
+"""Waypoints on long straight moves, where the arm's error varies between the ends; arcs get none."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,14 +9,15 @@ import numpy as np
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
+from truearm.programs.arcs import Arc, StatedArc, stated_arcs
 from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, author_of
-from truearm.programs.following import CLOSE_RAD, Follower, Line
+from truearm.programs.following import CLOSE_RAD, Course, Follower, Line
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn
 from truearm.programs.listing import listed_move
 from truearm.programs.program import LinearStep, Listed, Program, StepTexts
-from truearm.programs.tables import NOWHERE, Motion
+from truearm.programs.tables import NOWHERE, Motion, Via
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 from truearm.types import Floats, Integers, Mask, Transform
@@ -29,11 +30,11 @@ TURN_RAD: Final = np.deg2rad(5.0)
 """Of the tool from one sample to the next at most."""
 MOVES_NAMED: Final = 5
 FROM_ANYWHERE: Final = "where the arm comes from is not known"
-UNREACHED: Final = "the nominal arm does not reach all of the line"
-SINGULAR: Final = "the line leads too near to a singularity"
-ELSEWHERE: Final = (
-    "the line does not arrive at the readings of its target, which are of another configuration"
-)
+UNREACHED: Final = "the nominal arm does not reach all of the way"
+SINGULAR: Final = "the way leads too near to a singularity"
+ELSEWHERE: Final = "the way does not arrive at the readings of its target, which are of another configuration"
+ARC: Final = "an arc gets no waypoints: it deviates less in several shorter ones"
+NO_ARC: Final = "how far its arc deviates is followed only of arcs past a via point that end at their target"
 BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
 NO_ROOM: Final = "what blends it with its neighbours leaves no room for waypoints"
 OFFSET: Final = "its target has an offset, which a waypoint would not have"
@@ -65,11 +66,12 @@ class Spacing:
 
 @dataclass(frozen=True)
 class Deviating:
-    """A linear move that deviates, or may, by more than was allowed and got no waypoints.
+    """A linear move or an arc that deviates, or may, by more than was allowed and got no waypoints.
 
     Attributes:
         listed: Its statement, and why it got none.
-        deviation_mm: How far the path is from a straight line, as predicted; None where that is not known.
+        deviation_mm: How far the path is from a straight line or from the arc, as predicted; None where that
+            is not known.
     """
 
     listed: Listed
@@ -103,7 +105,7 @@ def deviation_notices(
     may = ", or may," if any(one.deviation_mm is None for one in deviating) else ""
     largest_mm = MM_PER_METRE * spacing.deviation_m
     text = (
-        f"{count_of(count, 'linear move')} {deviate}{may} by more than {largest_mm:g} mm (--densify-mm), "
+        f"{count_of(count, 'move')} {deviate}{may} by more than {largest_mm:g} mm (--densify-mm), "
         f"and waypoints could not be inserted there: {named}{more}"
     )
     return (Notice("deviation", text, tuple(sorted({one.listed.line for one in deviating}))),)
@@ -134,7 +136,7 @@ class Densifier:
         """Waypoints for every linear move between two changed targets.
 
         A move to a changed one from where the arm may be anywhere, as behind calls and at the heads of
-        loops, is told as one that may deviate.
+        loops, is told as one that may deviate. So are arcs that do between changed targets.
 
         Args:
             nominal: Readings of all targets, (t, N).
@@ -150,7 +152,7 @@ class Densifier:
         numbers = np.flatnonzero(lines & ~anywhere & changed[moves.before]).tolist()
         for done, move in enumerate(numbers):
             tell(done, len(numbers))
-            tool = self._program.environments[int(self._program.moves.environment[move])].tool
+            tool = self._environment(move).tool
             # Where the point that moves along the line is not known, neither is where waypoints belong.
             found = tool.unknown or self._between(move, ends[move], nominal[ends[move]])
             if isinstance(found, str):
@@ -160,6 +162,7 @@ class Densifier:
         tell(len(numbers), len(numbers))
         texts = self._program.language.linear_steps(self._program, stepped) if stepped else StepTexts()
         why.update(dict.fromkeys(texts.impossible, texts.why))
+        why.update(self._arcs(nominal, changed))
         deviating = (
             Deviating(listed_move(self._program, move, reason), self._deviation_mm.get(move))
             for move, reason in sorted(why.items())
@@ -174,28 +177,12 @@ class Densifier:
             targets: Where the arm stands before it, and where it leads, (2,).
             ends: Readings of these, (2, N).
         """
-        environment = self._program.environments[int(self._program.moves.environment[move])]
-        uses = self._encoder.uses
-        start, end = uses.displaced[targets].tolist()
-        displacement = uses.displacements[end]
-        tool = environment.tool.controller
-        poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
-        if start != end:
-            poses[0] = rigid_inverse(_moved(displacement)) @ _moved(uses.displacements[start]) @ poses[0]
-        shares, within = _shares(line := Line(*(poses @ tool)), self._spacing.least_m)
-        nominal = self._followed(line, tool, shares, ends)
-        if isinstance(nominal, str):
-            return nominal
-        if start == end:
-            nominal[0] = ends[0]
-        found = self._compensator.joints(
-            nominal,
-            tool=environment.tool.true,
-            author=author_of(self._robot, environment.tool, displacement),
-        )
-        if found.refused.any():
-            return f"waypoints between are refused: {found.refusals[0].reason}"
-        points = self._written(found.q, environment)
+        environment = self._environment(move)
+        shares, within = _shares(line := Line(*self._tools(move, targets, ends)), self._spacing.least_m)
+        q = self._corrected(move, line, shares, targets, ends)
+        if isinstance(q, str):
+            return q
+        points = self._written(q, environment)
         deviation_m = _deviation(points)
         self._deviation_mm[move] = MM_PER_METRE * deviation_m
         if deviation_m <= self._spacing.deviation_m:
@@ -203,11 +190,101 @@ class Densifier:
         chosen = self._chosen(move, points, within)
         if isinstance(chosen, str):
             return chosen
-        return self._steps(move, environment, found.q[list(chosen)], tuple(chosen.values()))
+        return self._steps(move, environment, q[list(chosen)], tuple(chosen.values()))
 
-    def _followed(self, line: Line, tool: Floats, shares: Floats, ends: Floats) -> Floats | str:
-        """Readings (n, N) at shares (n,) of a line between those at its `ends` (2, N), or why not."""
-        found = self._follower.along(line, tool, shares, ends[0], ends[-1])
+    def _environment(self, move: int) -> Environment:
+        return self._program.environments[int(self._program.moves.environment[move])]
+
+    def _tools(self, move: int, targets: Integers, q: Floats) -> Floats:
+        """Poses (k, 4, 4) of the tool where a move begins, where it passes and where it ends.
+
+        Args:
+            move: Its number.
+            targets: The targets there, (k,).
+            q: Readings of these, (k, N).
+        """
+        uses, tool = self._encoder.uses, self._environment(move).tool.controller
+        start, *_, end = uses.displaced[targets].tolist()
+        poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(q)))
+        if start != end:
+            moved = rigid_inverse(_moved(uses.displacements[end])) @ _moved(uses.displacements[start])
+            poses[0] = moved @ poses[0]
+        return poses @ tool
+
+    def _corrected(
+        self, move: int, way: Course, shares: Floats, targets: Integers, ends: Floats
+    ) -> Floats | str:
+        """Corrected readings (n, N) at shares (n,) of the way of a move, or why they are not known.
+
+        Args:
+            move: Its number.
+            way: The line or the arc.
+            shares: The shares, both ends among them.
+            targets: Where the arm stands before it, and where it leads, (2,).
+            ends: Readings of these, (2, N).
+        """
+        uses, tool = self._encoder.uses, self._environment(move).tool
+        nominal = self._followed(way, tool.controller, shares, ends)
+        if isinstance(nominal, str):
+            return nominal
+        start, end = uses.displaced[targets].tolist()
+        if start == end:
+            nominal[0] = ends[0]
+        found = self._compensator.joints(
+            nominal, tool=tool.true, author=author_of(self._robot, tool, uses.displacements[end])
+        )
+        if found.refused.any():
+            return f"places between its ends are refused: {found.refusals[0].reason}"
+        return found.q
+
+    def _arcs(self, nominal: Floats, changed: Mask) -> dict[int, str]:
+        """Arcs that deviate, or may, by more, and why they got no waypoints, by number of the move.
+
+        Args:
+            nominal: Readings of all targets, (t, N).
+            changed: As of `insert`.
+        """
+        moves, arcs = self._program.moves, {arc.end: arc for arc in stated_arcs(self._program.moves)}
+        vias = moves.motion == Motion.VIA
+        passing = set(zip(moves.source[vias].tolist(), moves.at[vias].tolist(), strict=True))
+        found: dict[int, str] = {}
+        for move in np.flatnonzero((moves.motion == Motion.CIRCULAR) & changed[moves.target]).tolist():
+            arc = arcs.get(move)
+            statement = int(moves.source[move]), int(moves.at[move])
+            if moves.before[move] == NOWHERE or (arc is None and statement in passing):
+                found[move] = FROM_ANYWHERE
+            elif arc is None or any(self._program.vias.get(via) == Via.OPEN for via in arc.vias):
+                found[move] = NO_ARC
+            elif changed[moves.target[list(arc.all)]].all():
+                why = self._environment(move).tool.unknown or self._off_arc(arc, nominal)
+                found.update({move: why} if why else {})
+        return found
+
+    def _off_arc(self, arc: StatedArc, nominal: Floats) -> str:
+        """Why an arc is told: it deviates by more, or that is not known; empty if it does not."""
+        targets = self._program.moves.target[list(arc.all)]
+        start, *vias, end = self._tools(arc.end, targets, nominal[targets])
+        way = Arc.through(start, vias, end)
+        if way is None:
+            return NO_ARC
+        passed = np.array([0.0, *(way.share_of(pose[:3, 3]) for pose in vias), 1.0])
+        shares = np.union1d(_shares(way, self._spacing.least_m)[0], passed)
+        q = self._corrected(arc.end, way, shares, targets[[0, -1]], nominal[targets[[0, -1]]])
+        if isinstance(q, str):
+            return q
+        points = self._written(q, self._environment(arc.end))
+        through = np.tile(np.eye(4), (len(passed), 1, 1))
+        through[:, :3, 3] = points[np.searchsorted(shares, passed)]
+        commanded = Arc.through(through[0], list(through[1:-1]), through[-1])
+        if commanded is None:
+            return NO_ARC
+        deviation_m = float(commanded.off_m(points).max())
+        self._deviation_mm[arc.end] = MM_PER_METRE * deviation_m
+        return ARC if deviation_m > self._spacing.deviation_m else ""
+
+    def _followed(self, way: Course, tool: Floats, shares: Floats, ends: Floats) -> Floats | str:
+        """Readings (n, N) at shares (n,) of a way between those at its `ends` (2, N), or why not."""
+        found = self._follower.along(way, tool, shares, ends[0], ends[-1])
         if found is None:
             return SINGULAR
         if np.isnan(found).any():
@@ -275,12 +352,12 @@ def _moved(displacement: Transform | None) -> Transform:
     return np.eye(4) if displacement is None else displacement
 
 
-def _shares(line: Line, least_m: float) -> tuple[Floats, int]:
-    """Shares (n,) of a line, both ends included, and how many steps lie in the least spacing; 0 where no
+def _shares(way: Course, least_m: float) -> tuple[Floats, int]:
+    """Shares (n,) of a way, both ends included, and how many steps lie in the least spacing; 0 where no
     waypoint has that on both sides.
     """
-    least = max(LEAST_SAMPLES, int(np.ceil(line.turn_rad / TURN_RAD)))
-    count = min(int(line.length_m / least_m) * WITHIN, MOST_SAMPLES)
+    least = max(LEAST_SAMPLES, int(np.ceil(way.turn_rad / TURN_RAD)))
+    count = min(int(way.length_m / least_m) * WITHIN, MOST_SAMPLES)
     if count < LEAST_SAMPLES:
         count, within = least, 0
     else:

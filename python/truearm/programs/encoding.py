@@ -1,5 +1,6 @@
 """From corrected readings q^c to the numbers that the program is to say, checked by reading them again."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,11 +12,12 @@ from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
-from truearm.programs.program import Program, numbers_of
-from truearm.programs.solving import AT_ONCE, are_singular
+from truearm.programs.program import Program, flange_poses_of, numbers_of
+from truearm.programs.solving import AT_ONCE, Solved, are_singular
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
 from truearm.turns import with_turns
 from truearm.types import Floats, Integers
 from truearm.units import MM_PER_METRE
@@ -26,6 +28,11 @@ MOST_DECIMALS: Final = 17
 """More than a double of some size holds; they come of an exponent."""
 AGREES_RAD: Final = 1e-3
 NOT_UNIQUE: Final = "no configuration data says its corrected readings and no others"
+POSITION: Final = 3
+"""How many numbers of a pose, the first ones, are its position."""
+POINT_SINGULAR: Final = (
+    "the joints that it states lie at a singularity, where those of its correction are not near"
+)
 CORRECTED_SINGULAR: Final = "its correction ends at a singularity, where a pose does not determine the joints"
 
 
@@ -50,29 +57,36 @@ class Written:
 
 
 def encode_targets(
-    program: Program, uses: Uses, q: Floats, which: Integers, controller: Controller
+    program: Program, uses: Uses, solved: Solved, which: Integers, controller: Controller
 ) -> Written:
-    """The numbers of targets `which` (n,) that say the readings `q` (t, N).
+    """The numbers of targets `which` (n,) that say their readings.
 
     Args:
         program: The program.
         uses: How its targets are used.
-        q: Corrected readings of all targets.
+        solved: What the targets mean, with corrected readings.
         which: Targets to write.
         controller: The controller's model.
     """
     encoder = Encoder(program, uses, controller.robot, controller.inverse)
+    points = np.isin(which, list(solved.points)) if solved.points else np.zeros(len(which), dtype=bool)
     for number, layout in enumerate(program.layouts):
-        chosen = which[program.targets.layout[which] == number]
-        if len(chosen) == 0:
-            continue
+        of_layout = program.targets.layout[which] == number
+        whole, placed = which[of_layout & ~points], which[of_layout & points]
+        for here, environment in _by_environment(program, uses, placed):
+            encoder.points(here, layout, environment, solved.q[here])
         if of_pose(layout):
-            for environment in np.unique(uses.environment[chosen]):
-                here = chosen[uses.environment[chosen] == environment]
-                encoder.poses(here, layout, program.environments[int(environment)], q[run_of(here)])
-        if of_joints(layout):
-            encoder.joints(chosen, layout, q[run_of(chosen)])
+            for here, environment in _by_environment(program, uses, whole):
+                encoder.poses(here, layout, environment, solved.q[run_of(here)])
+        elif of_joints(layout) and len(whole):
+            encoder.joints(whole, layout, solved.q[run_of(whole)])
     return encoder.written()
+
+
+def _by_environment(program: Program, uses: Uses, which: Integers) -> Iterator[tuple[Integers, Environment]]:
+    """Targets `which` (n,) with the environments that they are used in."""
+    for number in np.unique(uses.environment[which]).tolist():
+        yield which[uses.environment[which] == number], program.environments[number]
 
 
 class Encoder:
@@ -92,6 +106,37 @@ class Encoder:
         """Cartesian targets say where the controller's model puts the tool at q^c."""
         values, decimals = self.pose_numbers(which, layout, environment, q)
         self._keep(which, layout, values, decimals)
+        self._note_moved(which, layout, values)
+
+    def points(
+        self, which: Integers, layout: JointLayout | PoseLayout, environment: Environment, q: Floats
+    ) -> None:
+        """Targets of which only the position counts say where the tool is at q^c, turned as they state."""
+        stated = flange_poses_of(self.program, which, self.uses.environment[which], self.robot)
+        tool = environment.tool.controller
+        tools = self._flange(q) @ tool
+        tools[:, :3, :3] = (stated @ tool)[:, :3, :3]
+        flange = tools @ rigid_inverse(tool)
+        near = numbers_of(self.program, which, layout)
+        if of_joints(layout):
+            said, steady = joints_of(self.robot, flange, layout.to_readings(near))
+            self.reasons.update(dict.fromkeys(which[~steady].tolist(), POINT_SINGULAR))
+            self.joints(which, layout, said)
+        elif of_pose(layout):
+            width = layout.width - layout.configuration
+            values = np.array(near)
+            values[:, :width] = layout.from_poses(environment.stored_poses(flange), near[:, :width])
+            values[:, POSITION:] = near[:, POSITION:]
+            values, decimals = self._rounded(which, layout, values)
+            self._keep(which, layout, values, decimals, POSITION)
+            self._note_moved(which, layout, values)
+
+    def _flange(self, q: Floats) -> Floats:
+        """Where the controller believes the flange (n, 4, 4) at readings (n, N)."""
+        return self.robot.flange_chain.pose(np.ascontiguousarray(self.robot.joints_from_readings(q)))
+
+    def _note_moved(self, which: Integers, layout: PoseLayout, values: Floats) -> None:
+        """How far the positions of targets move that are written as `values` (n, width)."""
         width = layout.width - layout.configuration
         before = layout.to_poses(numbers_of(self.program, which, layout)[:, :width])
         after = layout.to_poses((values * self._factors(which, layout))[:, :width])
@@ -104,9 +149,7 @@ class Encoder:
         """Numbers and decimals (n, width) that say readings `q` (n, N) in the manner of targets `which`."""
         pose_width = layout.width - layout.configuration
         near = numbers_of(self.program, which, layout)
-        stored = environment.stored_poses(
-            self.robot.flange_chain.pose(np.ascontiguousarray(self.robot.joints_from_readings(q)))
-        )
+        stored = environment.stored_poses(self._flange(q))
         values = np.array(near)
         values[:, :pose_width] = layout.from_poses(stored, near[:, :pose_width])
         values, decimals = self._rounded(which, layout, values)
@@ -183,10 +226,18 @@ class Encoder:
         return factors
 
     def _keep(
-        self, which: Integers, layout: JointLayout | PoseLayout, values: Floats, decimals: Integers
+        self,
+        which: Integers,
+        layout: JointLayout | PoseLayout,
+        values: Floats,
+        decimals: Integers,
+        count: int | None = None,
     ) -> None:
+        """Numbers to write, (n, width), of each target the first `count`, if not all."""
         targets = self.program.targets
         present = targets.of(targets.starts, which, layout.width) >= 0
+        if count is not None:
+            present[:, count:] = False
         if self.reasons:
             present &= ~np.isin(which, list(self.reasons))[:, None]
         places = targets.numbers(which, layout.width)

@@ -1,6 +1,6 @@
 """In which readings an arm arrives on a line or an arc, where it does not change its posture at will."""
 
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -43,6 +43,22 @@ class Way(NamedTuple):
     tool: Floats
     flange: Floats
     arc: bool
+
+
+class Course(Protocol):
+    """Where a tool goes, and how it turns on the way.
+
+    Attributes:
+        length_m: How long it is.
+        turn_rad: How far the tool turns.
+    """
+
+    length_m: float
+    turn_rad: float
+
+    def poses(self, shares: Floats) -> Floats:
+        """Poses (n, 4, 4) at shares (n,) of the way."""
+        ...
 
 
 class Line:
@@ -157,14 +173,14 @@ class Follower:
         return None if found is None or np.isnan(found).any() else found[-1:]
 
     def along(
-        self, line: Line, tool: Floats, shares: Floats, before: Floats, likely: Floats
+        self, line: Course, tool: Floats, shares: Floats, before: Floats, likely: Floats
     ) -> Floats | None:
-        """Readings (n, N) at shares (n,) of a line, in their order, NaN where some pose is not reached.
+        """Readings (n, N) at shares (n,) of a way, in their order, NaN where some pose is not reached.
 
-        None where the arm cannot follow the line: near a singularity, or at a limit of a joint.
+        None where the arm cannot follow it: near a singularity, or at a limit of a joint.
 
         Args:
-            line: The line.
+            line: The line or the arc.
             tool: flange_from_tool (4, 4).
             shares: Shares of the way.
             before: Readings (N,) at its start.
@@ -184,8 +200,8 @@ class Follower:
             share = until
         return found
 
-    def _further(self, line: Line, back: Floats, q: Floats, way: tuple[float, float]) -> Floats | None:
-        """From readings (N,) at one share of a line to those at another, step by step."""
+    def _further(self, line: Course, back: Floats, q: Floats, way: tuple[float, float]) -> Floats | None:
+        """From readings (N,) at one share of a way to those at another, step by step."""
         share, until = way
         step = until - share
         while share < until:

@@ -10,7 +10,7 @@ from truearm.programs.layouts import Layout
 from truearm.programs.listing import listed_at
 from truearm.programs.program import Language, LineCount, Listed, Program, Unplaced
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, MoveTable, Targets, TargetTable
+from truearm.programs.tables import Motion, MoveTable, Targets, TargetTable, Via
 
 
 @dataclass(eq=False)
@@ -32,6 +32,7 @@ class Gathered:
     fixed: dict[int, str] = field(default_factory=dict)
     unsure: set[int] = field(default_factory=set)
     nearest: dict[int, bool] = field(default_factory=dict)
+    vias: dict[int, Via] = field(default_factory=dict)
     unplaced: list[Unplaced] = field(default_factory=list)
     line_count: LineCount | None = None
 
@@ -77,6 +78,7 @@ class Gathered:
             fixed=self.fixed,
             unsure=self.unsure,
             nearest=self.nearest,
+            vias=self.vias,
             unplaced=self.unplaced,
             line_count=self.line_count,
         )

@@ -61,12 +61,12 @@ from truearm.programs.krl_values import (
     operands,
     structure,
 )
-from truearm.programs.krl_words import BLENDING, MOTIONS, RELATIVE, SPLINE_ENDS, SPLINES
+from truearm.programs.krl_words import BLENDING, MOTIONS, RELATIVE, SPLINE_ENDS, SPLINES, VIAS
 from truearm.programs.layouts import EulerPose, Joints
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Program
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion
+from truearm.programs.tables import Motion, Via
 from truearm.robot import Robot
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class KrlReading:
             self._calls_of(reader.rest())
         if word in MOTIONS and reader.peek(1) not in {"=", "(", "[", "."}:
             at = reader.take().start
-            self._motion((file, at), MOTIONS[word], reader, passing=word == "spl")
+            self._motion((file, at), word, reader)
         elif word in RELATIVE:
             self._found.leave((file, reader.offset), "a relative move")
             self._storage.read |= names_in(reader.rest())
@@ -310,8 +310,8 @@ class KrlReading:
             return FrameData("FDAT_ACT", file, structure(reader))
         return self._frames.frame_data(reader.peek())
 
-    def _motion(self, place: tuple[int, int], motion: Motion, reader: Reader, *, passing: bool) -> None:
-        whole = reader.rest()
+    def _motion(self, place: tuple[int, int], word: str, reader: Reader) -> None:
+        whole, motion = reader.rest(), MOTIONS[word]
         chains = [operands(reader)]
         if motion == Motion.CIRCULAR:
             chains.append(operands(reader) if reader.accept(",") else None)
@@ -319,9 +319,11 @@ class KrlReading:
         words = [token.text.lower() for token in found]
         before = self._flow.state
         self._flow.state = self._with(found).along(motion)
-        blended = passing or self._in_spline or bool(BLENDING & set(words))
+        blended = word == "spl" or self._in_spline or bool(BLENDING & set(words))
         kinds = [Motion.VIA, Motion.CIRCULAR] if motion == Motion.CIRCULAR else [motion]
         for number, (kind, chain) in enumerate(zip(kinds, chains, strict=True)):
+            if kind == Motion.VIA:
+                self._found.vias[len(self._found.moves)] = Via.OPEN if ANGLE in words else VIAS[word]
             if not self._go(place, chain, kind, blended=blended or kind == Motion.VIA):
                 self._storage.read |= names_in([token for part in _parts(whole)[number:] for token in part])
         if "with" in words:

@@ -14,7 +14,7 @@ from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
 from truearm.programs.listing import listed_target
 from truearm.programs.program import Program, numbers_of
-from truearm.programs.solving import are_singular
+from truearm.programs.solving import Solved, are_singular
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
@@ -97,38 +97,41 @@ class Offsets:
         apart = replace(program, targets=targets, moves=moves_now)
         return cls(apart, Uses.of(apart, whole_poses=whole_poses), stands_for, count + np.arange(len(places)))
 
-    def judged(self, known: Mask, corrected: Floats, controller: Robot, largest_mm: float) -> "Judged":
+    def judged(self, known: Mask, corrected: Solved, controller: Robot, largest_mm: float) -> "Judged":
         """Whether the change of a target for its use as it stands suits its uses with offsets.
 
         Args:
             known: Targets whose corrections are known, (t,).
-            corrected: Corrected readings (t, N).
+            corrected: What the targets mean, with corrected readings.
             controller: The controller's model.
             largest_mm: How far off the tool's place may be at a use with an offset.
         """
         off_mm, off_mrad = np.full((2, len(known)), np.nan)
         reasons: dict[int, str] = {}
-        heeding = self._heeding()
+        q, heeding = corrected.q, self._heeding()
+        whole = np.ones(len(known), dtype=bool)
+        whole[list(corrected.points)] = False
         for target in np.unique(self.stands_for).tolist():
             others = self.others[self.stands_for == target]
             if not (known[target] and known[others].all()):
                 reasons[target] = NOT_KNOWN
                 continue
             rows = np.array([target, *others.tolist()])
-            off_mm[target], off_mrad[target] = self._off(rows, corrected[rows], controller)
+            off_mm[target], off_mrad[target] = self._off(rows, q[rows], controller, whole[others])
             if off_mm[target] > largest_mm:
                 reasons[target] = (
                     f"with its correction a use with an offset would be {off_mm[target]:.3f} mm off"
                 )
-            elif are_singular(controller, corrected[others]).any():
+            elif are_singular(controller, q[others]).any():
                 reasons[target] = STRETCHED
-            elif self._turned(rows[[True, *heeding[others].tolist()]], corrected):
+            elif whole[target] and self._turned(np.append(target, others[(heeding & whole)[others]]), q):
                 reasons[target] = TURNED
         return Judged(reasons, off_mm, off_mrad)
 
-    def _off(self, rows: Integers, q: Floats, controller: Robot) -> tuple[float, float]:
+    def _off(self, rows: Integers, q: Floats, controller: Robot, whole: Mask) -> tuple[float, float]:
         """How far off the tool is at most, mm and mrad, at the last of targets `rows` (n,), if the first says
-        what readings `q` (n, N) have for it; these are all places of one stored target.
+        what readings `q` (n, N) have for it; these are all places of one stored target. How it is turned
+        counts at those that are `whole` (n - 1,).
         """
         flange = controller.flange_chain.pose(np.ascontiguousarray(controller.joints_from_readings(q)))
         uses = self.uses.environment[rows]
@@ -138,8 +141,8 @@ class Offsets:
         commanded = np.concatenate([one.flange_poses(stored) for one in with_offsets]) @ here.tool.true
         far_m = np.linalg.norm(commanded[:, :3, 3] - tools[1:, :3, 3], axis=1)
         turned = np.swapaxes(tools[1:, :3, :3], 1, 2) @ commanded[:, :3, :3]
-        turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)
-        return MM_PER_METRE * float(far_m.max()), MRAD_PER_RAD * float(turn_rad.max())
+        turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)[whole]
+        return MM_PER_METRE * float(far_m.max()), MRAD_PER_RAD * float(turn_rad.max(initial=0.0))
 
     def _heeding(self) -> Mask:
         """Targets at which the controller may heed configuration data, (t,)."""

@@ -5,12 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from truearm.programs.configuration import Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.frames import Frames
-from truearm.programs.layouts import JointLayout, Layout, PoseLayout
+from truearm.programs.layouts import JointLayout, Layout, PoseLayout, of_joints, of_pose
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, Moves, Targets, all_ones
+from truearm.programs.tables import Motion, Moves, Targets, Via, all_ones
 from truearm.robot import Robot
 from truearm.types import Floats, Integers
 
@@ -85,6 +87,8 @@ class Program:
         unsure: Numbers of those of them that may be others when the program runs: they tell no place.
         nearest: Moves to the configuration nearest to where the arm stands, whatever the data of the target
             says, by number; False where that is not certain.
+        vias: How arcs are turned where they pass their via points, by number of the move there;
+            Via.BETWEEN for those that are not named.
         unplaced: Motions that are listed as they lead to no numbers of the program.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
         line_count: Where its first file says how many lines it has; None where it does not.
@@ -102,6 +106,7 @@ class Program:
     fixed: Mapping[int, str] = field(default_factory=dict)
     unsure: Set[int] = frozenset()
     nearest: Mapping[int, bool] = field(default_factory=dict)
+    vias: Mapping[int, Via] = field(default_factory=dict)
     unplaced: Sequence[Unplaced] = ()
     line_count: LineCount | None = None
 
@@ -240,3 +245,29 @@ def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayo
     numbers: Floats = targets.of(targets.values, which, width)
     factors = targets.of(targets.factors, which, width)
     return numbers if all_ones(factors) else numbers * factors
+
+
+def flange_poses_of(program: Program, which: Integers, environments: Integers, robot: Robot) -> Floats:
+    """Poses (n, 4, 4) of the flange that the controller makes of targets; NaN where they are not known.
+
+    Args:
+        program: The program.
+        which: Numbers of the targets, (n,).
+        environments: Number of the environment in which each is used, (n,).
+        robot: The programming model.
+    """
+    found = np.full((len(which), 4, 4), np.nan)
+    for number, layout in enumerate(program.layouts):
+        for environment in np.unique(environments).tolist():
+            here = (program.targets.layout[which] == number) & (environments == environment)
+            used = program.environments[environment]
+            if not here.any():
+                continue
+            numbers = numbers_of(program, which[here], layout)
+            if of_joints(layout) and not used.problem:
+                q = np.ascontiguousarray(layout.to_readings(numbers))
+                found[here] = robot.flange_chain.pose(robot.joints_from_readings(q))
+            elif of_pose(layout) and not used.why_not_poses:
+                stored = layout.to_poses(numbers[:, : layout.width - layout.configuration])
+                found[here] = used.flange_poses(stored)
+    return found

@@ -55,6 +55,7 @@ HARMLESS: Final = frozenset(
         "accset",
         "velset",
         "singarea",
+        "cirpathmode",
         "confj",
         "confl",
         "clkstart",

@@ -43,7 +43,7 @@ from truearm.programs.rapid_values import (
     statements,
 )
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion
+from truearm.programs.tables import Motion, Via
 from truearm.robot import Robot
 from truearm.types import Transform
 
@@ -117,7 +117,7 @@ class RapidReading:
         )
         start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
-        self._confs = Confs()
+        self._confs, self._via = Confs(), Via.ON_PATH
         self._used: list[int] = []
         self._uses: list[_Use] = []
         self._gifts: set[tuple[str, str]] = set()
@@ -270,6 +270,10 @@ class RapidReading:
 
     def _call(self, at: int, word: str, found: Sequence[Token]) -> None:
         self._mention(found[1:], PASSED, "" if word in JUMPS | HARMLESS else word)
+        if word == "cirpathmode" and any(
+            token.text.lower() not in {"\\", "pathframe"} for token in found[1:]
+        ):
+            self._via = Via.UNTOLD
         if word in SETTINGS:
             self._confs.set(word, {token.text.lower() for token in found[1:]})
         elif word in JUMPS:
@@ -380,6 +384,8 @@ class RapidReading:
             for target in use.meant.targets:
                 if number in nearest:
                     self._found.nearest[len(self._found.moves)] = nearest[number]
+                if use.motion == Motion.VIA:
+                    self._found.vias[len(self._found.moves)] = self._via
                 self._found.moves.add(
                     target,
                     (0, use.at),

@@ -35,7 +35,7 @@ from truearm.programs.open_turns import depending_on_turns
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
-from truearm.programs.solving import are_singular, solve_targets
+from truearm.programs.solving import Solved, are_singular, solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import placed, run_of
 from truearm.programs.uses import SEVERAL, Uses, target_count
@@ -124,6 +124,7 @@ class Rewritten:
         nominal: Readings that the author meant, with tools and work objects as the controller has them,
             (t, N); NaN where they are not known.
         corrected: Readings that the program says now, (t, N); the nominal ones where it was left as it was.
+            Of via points of which only the position counts: those in which the arc passes them.
         changed: Targets that were changed, (t,).
         correction_mm: How far the tool's target moved from where the program said it, for the controller's
             tool, (t,); NaN where it was not changed. Like the next four, the largest where a joint target has
@@ -251,7 +252,7 @@ def rewrite(
     known: Mask = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False
     known &= uses.moved
-    state = _State(program, uses, models, solved.q, known, tell, given)
+    state = _State(program, uses, models, solved, known, tell, given)
     state.reasons.update(solved.reasons)
     for target in also_with_offsets(program) if offsets is None else ():
         if state.reasons.get(target) == SEVERAL:
@@ -288,7 +289,7 @@ class _State:
     program: Program
     uses: Uses
     models: Models
-    nominal: Floats
+    solved: Solved
     known: Mask
     tell: Tell
     given: _Given
@@ -297,6 +298,7 @@ class _State:
     codes: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
+        self.nominal = self.solved.q
         self.corrected = np.broadcast_to(self.nominal, self.nominal.shape)
         unknown = np.broadcast_to(np.nan, len(self.nominal))
         self.correction_mm = self.correction_mrad = self.std_mm = unknown
@@ -378,7 +380,8 @@ class _State:
         self.others, self.stands_for = offsets.others, offsets.stands_for
         usable = np.array(self.known)
         usable[list(self.refused)] = False
-        judged = offsets.judged(usable, self.corrected, self.models.controller.robot, largest_mm)
+        corrected = replace(self.solved, q=self.corrected)
+        judged = offsets.judged(usable, corrected, self.models.controller.robot, largest_mm)
         for target, why in judged.reasons.items():
             if self.known[target] and target not in self.refused:
                 self.reasons[target] = why
@@ -423,7 +426,7 @@ class _State:
         written = encode_targets(
             self.program,
             self.uses,
-            self.corrected,
+            replace(self.solved, q=self.corrected),
             np.flatnonzero(changed),
             self.models.controller,
         )

@@ -4,7 +4,7 @@ Configuration data and the target before tell of the author's readings: those of
 and work objects as the controller has them, wherever these truly are.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -14,12 +14,13 @@ from truearm.inverse import Inverse
 from truearm.programs.carrying import Origins
 from truearm.programs.configuration import ANY, meant
 from truearm.programs.following import CLOSE_RAD, Arrived, Follower, Way
-from truearm.programs.layouts import of_joints, of_pose
-from truearm.programs.program import Program, motion_is_straight, numbers_of
+from truearm.programs.layouts import of_joints
+from truearm.programs.program import Program, flange_poses_of, motion_is_straight, numbers_of
 from truearm.programs.rounding import rounded_rad
 from truearm.programs.tables import NOWHERE, Motion, placed, run_of
 from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
+from truearm.programs.vias import passed_vias
 from truearm.robot import Robot
 from truearm.turns import EDGE_RAD, NearestTurns, turned_away, with_turns
 from truearm.types import Floats, Integers, Mask
@@ -67,11 +68,13 @@ class Solved:
         q: Readings of each target, (t, N), rad and m; NaN where they are not known.
         reasons: Why a target cannot be changed, by its number.
         open_turns: Numbers of those that the arm may reach at other turns of its joints than `q` says.
+        points: Targets of which only the position counts.
     """
 
     q: Floats
     reasons: dict[int, str]
     open_turns: frozenset[int]
+    points: Set[int] = frozenset()
 
 
 def solve_targets(
@@ -89,7 +92,9 @@ def solve_targets(
     solver = _Solver(program, uses, robot, inverse)
     solver.take_joints()
     solver.take_poses(tell)
-    return Solved(solver.q, solver.reasons, frozenset(solver.open_turns - solver.reasons.keys()))
+    return Solved(
+        solver.q, solver.reasons, frozenset(solver.open_turns - solver.reasons.keys()), solver.points
+    )
 
 
 class _Named(NamedTuple):
@@ -150,12 +155,18 @@ class _Solver:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
         self._nearest_turns = NearestTurns(robot)
         self._follower = Follower(robot, inverse)
+        self._passed = passed_vias(program, uses, robot)
         self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
         self.open_turns: set[int] = set()
         self._refused: frozenset[int] = frozenset()
         self._origins = Origins(program.moves, self._known, self._is_lost)
         self._unheeded = {int(program.moves.target[move]) for move in program.nearest}
+
+    @property
+    def points(self) -> Set[int]:
+        """Targets of which only the position counts."""
+        return self._passed.flange.keys()
 
     def take_joints(self) -> None:
         """Joint targets say their readings; all that cannot be changed whatever they say are named."""
@@ -173,6 +184,8 @@ class _Solver:
             here = self.uses.environment == number
             self._refuse(here & self.uses.of_joints, environment.problem)
             self._refuse(here & ~self.uses.of_joints, environment.why_not_poses)
+        for passed, why in self._passed.reasons.items():
+            self.reasons.setdefault(passed, why)
 
     def _refuse(self, which: Mask, reason: str) -> None:
         if reason:
@@ -183,11 +196,14 @@ class _Solver:
         """Cartesian targets, in the order of the moves, each near its seed or where the arm stands."""
         self._refused = frozenset(self.reasons)
         poses = self._flange_poses()
+        points = {number: pose for number, pose in self._passed.flange.items() if number not in self.reasons}
+        poses.update(points)
         moves = self.program.moves
         moved = np.flatnonzero(moves.moving & np.isin(moves.target, list(poses)))
         if len(moved) == 0:
             return
         self.q = np.require(self.q, requirements="W")
+        self.q[list(points)] = np.nan
         for start in range(0, len(moved), AT_ONCE):
             tell(start, len(moved))
             self._take_some(moved[start : start + AT_ONCE], poses)
@@ -209,7 +225,7 @@ class _Solver:
 
     def _came(self, move: int, near: int, way: Way | None, possible: _Possible) -> _Came:
         """How the arm comes to a target; at turns that are not known on lines and arcs alone."""
-        before, nearest = self._known(near), self.program.nearest.get(move)
+        before, nearest = self._before(move, near), self.program.nearest.get(move)
         at_open_turns = near in self.open_turns
         if way is None or possible.named is not None or possible.flange is not None:
             return _Came(None if at_open_turns else before, way, nearest)
@@ -219,6 +235,23 @@ class _Solver:
     def _is_lost(self, target: int) -> bool:
         """Whether the way to a target whose readings are not known, or the target, may change the posture."""
         return target not in self._refused and self.reasons.get(target) != UNKNOWN_BEFORE
+
+    def _before(self, move: int, near: int) -> Floats | None:
+        """The readings near which those of a move are looked for, at its target `near`, if they are known.
+
+        On an arc those at its start otherwise, be it that the start itself cannot be changed.
+        """
+        arc = self._passed.starts.get(move)
+        known = None if arc is not None and near in self._passed.reasons else self._known(near)
+        if known is not None or arc is None:
+            return known
+        start, flange = arc
+        known = self._known(start)
+        if known is not None:
+            return known
+        possible = self._possible(np.array([start]), {start: flange})[start]
+        found = self._chosen(possible, _Came(None, None, None))
+        return None if isinstance(found, str) else found
 
     def _known(self, target: int) -> Floats | None:
         """The readings of a target; None where they are not known."""
@@ -296,24 +329,18 @@ class _Solver:
             if wanted is None:
                 wanted = np.full((len(some), digits.shape[1]), ANY, dtype=np.int64)
             wanted[here] = digits
+        if wanted is not None:
+            wanted[np.isin(some, list(self.points))] = ANY
         return wanted
 
     def _flange_poses(self) -> dict[int, Floats]:
         """Poses of the flange for every Cartesian target that may be changed."""
-        found: dict[int, Floats] = {}
         usable = ~self.uses.of_joints & (self.uses.environment >= 0)
         usable[list(self.reasons)] = False
-        for number, layout in enumerate(self.program.layouts):
-            for environment in np.unique(self.uses.environment[usable]):
-                here = usable & (self.uses.environment == environment)
-                which = np.flatnonzero(here & (self.program.targets.layout == number))
-                if len(which) == 0 or not of_pose(layout):
-                    continue
-                values = numbers_of(self.program, which, layout)[:, : layout.width - layout.configuration]
-                stored = layout.to_poses(values)
-                poses = self.program.environments[int(environment)].flange_poses(stored)
-                found.update(zip(which.tolist(), poses, strict=True))
-        return found
+        which = np.flatnonzero(usable)
+        poses = flange_poses_of(self.program, which, self.uses.environment[which], self.robot)
+        known = np.isfinite(poses[:, 0, 0])
+        return dict(zip(which[known].tolist(), poses[known], strict=True))
 
     def _take(self, target: int, possible: _Possible, came: _Came) -> None:
         if target in self.reasons:

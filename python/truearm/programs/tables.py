@@ -50,7 +50,7 @@ class Motion(IntEnum):
     Attributes:
         JOINT: Joint by joint.
         LINEAR: On a straight line.
-        VIA: On an arc that goes on behind it.
+        VIA: On an arc that goes on behind it; its position counts, how it is turned as Via tells.
         CIRCULAR: At the end of an arc.
         SEED: A solution near these readings is taken for the target of the next move.
         BESIDE: It only shapes a path that ends elsewhere, as the centre of an arc does.
@@ -62,6 +62,22 @@ class Motion(IntEnum):
     CIRCULAR = 3
     SEED = 4
     BESIDE = 5
+
+
+class Via(IntEnum):
+    """What an arc turns the tool by where it passes its via point.
+
+    Attributes:
+        BETWEEN: Its start and its end, evenly, whatever the via point states.
+        ON_PATH: The same, evenly in a frame that goes round with the path.
+        OPEN: The same, as far as an angle goes that the arc is given.
+        UNTOLD: Perhaps what the via point states.
+    """
+
+    BETWEEN = 0
+    ON_PATH = 1
+    OPEN = 2
+    UNTOLD = 3
 
 
 class Number(NamedTuple):

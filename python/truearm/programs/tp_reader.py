@@ -12,7 +12,7 @@ from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames
 from truearm.programs.gathered import Gathered
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, Number
+from truearm.programs.tables import Motion, Number, Via
 from truearm.programs.tp_calls import may_leave
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
 from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, line_count, positions, section
@@ -186,6 +186,9 @@ class Reader:
             position = self._positions[number]
             environment = self.found.environments.number(self._environment(position, problem))
             self._used.setdefault(self._targets[number], set()).add(environment)
+            if via:
+                # FANUC's manuals that can be had do not say whether the orientation of a via point counts.
+                self.found.vias[len(self.found.moves)] = Via.UNTOLD
             self.found.moves.add(
                 self._targets[number],
                 (0, at),
