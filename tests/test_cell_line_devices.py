@@ -109,10 +109,14 @@ def robot_of(arm, **keys):
     ],
 )
 def test_commands_have_decimals_unless_all_numbers_are_to_have_an_exponent(field, wanted):
-    lines = []
-    arm = Arm()
+    lines, arm = [], Arm()
+
+    def answers(line):
+        lines.append(line)
+        return arm(line)
+
     move = "MOVE " + " ".join(field.replace("NAME", f"q{j}") for j in range(1, 5))
-    with robot_of(lambda line: [lines.append(line), *arm(line)][1:], move=move) as robot:
+    with robot_of(answers, move=move) as robot:
         robot.move_joints(np.array([-(2.0**-55), -np.pi / 4.0, 1e-8, 1.0]))
     assert [line for line in lines if line.startswith("MOVE")] == [wanted]
 
