@@ -1,5 +1,7 @@
 """An arm, and a table, are driven by one process at a time, whatever session that one writes."""
 
+import socket
+import tempfile
 from unittest.mock import Mock, patch
 
 import numpy as np
@@ -54,7 +56,45 @@ def test_what_drives_an_arm_lets_go_of_it_and_leaves_others_alone(tmp_path, caps
     assert "no connection" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("robot", "table", "message"),
+    [("localhost", "127.0.0.1", "drives this arm"), ("other.invalid", "LOCALHOST", "drives this table")],
+)
+def test_devices_are_known_under_each_name_of_their_host(
+    robot, table, message, free_port, tmp_path, monkeypatch
+):
+    def at(robot, table):
+        settings = {"host": robot, "realtime_port": free_port}
+        return Cell.from_toml(
+            cell_text("ur", robot=settings, sensor={"port": f"tcp://{table}:{free_port + 1}"})
+        )
+
+    with alone(at("127.0.0.1", "127.0.0.1")):
+        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+        with pytest.raises(WorkError, match=message), alone(at(robot, table)):
+            pass
+
+
+@pytest.fixture
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield server.getsockname()[1]
+
+
+def test_serial_ports_are_known_under_each_of_their_names(tmp_path):
+    port, name = tmp_path / "ttyS0", tmp_path / "by-id"
+    port.touch()
+    name.symlink_to(port)
+    texts = [cell_text("rv-m2", robot={"port": str(robot)}) for robot in (port, name)]
+    with (
+        alone(Cell.from_toml(texts[0])),
+        pytest.raises(WorkError, match="drives this arm"),
+        alone(Cell.from_toml(texts[1])),
+    ):
+        pass
+
+
 def test_recordings_are_played_side_by_side():
     cell = Cell.from_toml(cell_text("playback"))
-    with patch("truearm.cell.alone.FileLock") as lock, alone(cell), alone(cell):
+    with patch("truearm.cell.alone.held") as lock, alone(cell), alone(cell):
         lock.assert_not_called()

@@ -101,6 +101,26 @@ def robot_of(arm, **keys):
             yield robot
 
 
+@pytest.mark.parametrize(
+    ("field", "wanted"),
+    [
+        ("{NAME}", "MOVE 0.0 -45.0 0.00001 57.295779513"),
+        ("{NAME:e}", "MOVE -1.590277e-15 -4.500000e+01 1.000000e-05 5.729578e+01"),
+    ],
+)
+def test_commands_have_decimals_unless_all_numbers_are_to_have_an_exponent(field, wanted):
+    lines, arm = [], Arm()
+
+    def answers(line):
+        lines.append(line)
+        return arm(line)
+
+    move = "MOVE " + " ".join(field.replace("NAME", f"q{j}") for j in range(1, 5))
+    with robot_of(answers, move=move) as robot:
+        robot.move_joints(np.array([-(2.0**-55), -np.pi / 4.0, 1e-8, 1.0]))
+    assert [line for line in lines if line.startswith("MOVE")] == [wanted]
+
+
 @pytest.mark.parametrize("delay_s", [0.05, 0.3])
 def test_a_robot_that_is_slow_to_begin_is_told_once(delay_s):
     with robot_of(arm := Arm(delay_s=delay_s)) as robot:
@@ -344,6 +364,9 @@ def line_cell(**robot):
         ("move", "MOVE {q7}", "robot, move.*Known here: q1"),
         ("move", "MOVE {q1:d}", "robot, move.*cannot be filled"),
         ("move", "MOVE {q1} {q2} {q3} {q4} {q5}", "leaves out {q6}"),
+        ("move", "MOVE {q1:g} {q2} {q3} {q4} {q5} {q6}", "exponent: MOVE 1e-07 .*Name decimals, as {q1:.4f}"),
+        ("move", "MOVE {q1!r} {q2} {q3} {q4} {q5} {q6}", "exponent: MOVE 1e-07 0.0000001 "),
+        ("move_pose", "LIN {x:.3e} {y:.6}", "robot, move_pose.*exponent: LIN 1.000e-07 1e-07"),
         ("move_pose", "LIN {a}", "robot, move_pose.*Known here: x"),
         ("refused", "ERR (", "robot, refused.*no regular expression"),
         ("port", "tcp://localhost", "robot, port.*no TCP port"),

@@ -1,17 +1,19 @@
 """Ways past the table: rehearsed as they will be gone, and poses put into an order in which there is one."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.cell_support import cell_text, poses_of
-from truearm.cell import Cell
+from truearm.cell import Cell, RefusedError
 from truearm.cell.clearance import Clearance
 from truearm.cell.examples import example
 from truearm.cell.motion import Motion
-from truearm.cell.plan import PlanOptions, plan_poses
+from truearm.cell.plan import PlanOptions, measurable_pool, plan_poses
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
 from truearm.cell.reaching import within_reach
@@ -144,6 +146,42 @@ def test_the_arm_goes_first_where_it_rises_and_the_table_where_it_comes_down():
     assert ways.count((True, False)) > 5
     assert ways.count((False, True)) > 5
     assert ways.count("around") + ways.count((True, True)) + ways.count((False, False)) < 5
+
+
+def test_planned_pins_meet_the_panel_wherever_the_base_may_stand():
+    cell = Cell.from_toml(example("rv-m2"))
+    pool = measurable_pool(motion_of(cell), 400, 0)
+    flanges = cell.arm.flange_chain.pose(cell.arm.joints_from_readings(pool))
+    along = flanges[:, :3, :3] @ cell.flange_from_target[:3, 3]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    assert cell.file.world is not None
+    angles = []
+    for direction in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
+        turn = np.radians(0.5) * np.array([np.cos(direction), np.sin(direction), 0.0])
+        off = cell.file.world.transform()[:3, :3] @ Rotation.from_rotvec(turn).as_matrix()
+        # The panel faces up: how far the pin comes from above.
+        angles.append(np.degrees(np.arcsin(-(along @ off.T)[:, 2])))
+    assert np.min(angles) >= 15.0
+    assert np.min(angles) < 17.0
+
+
+def test_a_pin_that_may_be_turned_too_far_is_refused_until_the_frame_is_known():
+    cell = Cell.from_toml(example("rv-m2"))
+    prediction, table = Prediction(cell), cell.sensor
+    assert isinstance(table, TablePanel)
+    expected = replace(
+        prediction.expected(Step(0, "pose", 0, "", 0, np.array([0.0, 0.9, -1.9, 0.0, 0.0]))),
+        pointing_in_world=np.array([np.cos(np.radians(15.3)), 0.0, -np.sin(np.radians(15.3))]),
+        point_in_world=np.array([0.3, 0.2, 0.3]),
+    )
+    with pytest.raises(
+        RefusedError, match=r"at 15\.3 deg. At least 15 deg are needed, and it may be turned by 0\.5"
+    ):
+        table.carriage_for(expected)
+    assert prediction.world_from_base is not None
+    prediction.register(prediction.world_from_base, 0.001)
+    known = prediction.expected(Step(0, "pose", 0, "", 0, expected.readings))
+    table.carriage_for(replace(expected, turned_rad=known.turned_rad))
 
 
 def test_no_table_no_problem():

@@ -3,7 +3,9 @@
 import json
 import subprocess
 import sys
+import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -15,11 +17,13 @@ from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from truearm.cli import main
-from truearm.errors import UsageError
+from truearm.errors import UsageError, WorkError
 from truearm.exporting import constant_robot
+from truearm.files import write_whole
 from truearm.framing import write_frame
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.inverse import Inverse
+from truearm.locks import held
 from truearm.programs.frames import Frames
 from truearm.simulation import VirtualArm
 
@@ -243,3 +247,30 @@ def test_a_frame_without_a_name_is_not_written(tmp_path):
     with pytest.raises(UsageError, match="Programs call it by a name"):
         write_frame(tmp_path / "frames.toml", " ", found, "")
     assert not (tmp_path / "frames.toml").exists()
+
+
+def test_frames_that_are_found_at_once_are_all_in_the_file(tmp_path, monkeypatch):
+    def written_late(path, text):
+        time.sleep(0.05)
+        write_whole(path, text)
+
+    monkeypatch.setattr("truearm.framing.frames_toml.write_whole", written_late)
+    rows, nothing = np.arange(3), np.zeros((6, 6))
+    found = IdentifiedFrame("tool", np.eye(4), nothing, np.zeros((3, 3)), rows, 1e-5, 3, "a test")
+    names = [f"T{k}" for k in range(6)]
+    link = tmp_path / "link.toml"
+    link.symlink_to("frames.toml")
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(write_frame, [tmp_path / "frames.toml", link] * 3, names, [found] * 6, [""] * 6))
+    assert sorted(tomllib.loads((tmp_path / "frames.toml").read_text())["tool"]) == names
+
+
+def test_a_file_into_which_another_process_writes_on_and_on_stays_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr("truearm.framing.frames_toml.WAIT_S", 0.0)
+    path = tmp_path / "frames.toml"
+    lock = held(str(path.resolve()), "", where="")
+    found = cast(IdentifiedFrame, SimpleNamespace(kind="tool"))
+    with pytest.raises(WorkError, match=r"frames\.toml: another process writes into this file"):
+        write_frame(path, "T0", found, "")
+    lock.release()
+    assert not path.exists()

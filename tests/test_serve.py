@@ -236,11 +236,14 @@ def test_features_may_change(tmp_path):
 
 
 @contextlib.contextmanager
-def served_here(calib, **bounds):
+def served_here(calib, token=None, **bounds):
     """The port of a server in this process."""
     compensator = ta.Compensator(ta.Calibration.load(calib))
     server = Server(
-        compensator.calibration.robot, lambda: CorrectionStream(compensator), bounds=Bounds(**bounds)
+        compensator.calibration.robot,
+        lambda: CorrectionStream(compensator),
+        token=token,
+        bounds=Bounds(**bounds),
     )
     ports: queue.Queue[int] = queue.Queue()
     ends: queue.Queue[object] = queue.Queue()
@@ -290,6 +293,22 @@ def test_too_many_connections_are_turned_away(port):
         assert sum("error" in greeting for greeting in greetings) >= 4
     time.sleep(0.1)
     assert is_served(port)
+
+
+def test_who_has_no_token_takes_no_place(calib):
+    with contextlib.ExitStack() as stack:
+        port = stack.enter_context(served_here(calib, TOKEN, connections=2, waiting=3, token_s=60.0))
+        clients = [stack.enter_context(Client(port)) for _ in range(2)]
+        assert clients[0].ask({"token": TOKEN})["protocol"] == 1
+        idle = [stack.enter_context(Client(port)) for _ in range(20)]
+        assert idle[0].read()["error"] == "newer connections came before the token"
+        with Client(port) as client:
+            assert client.ask({"token": TOKEN})["protocol"] == 1
+            assert client.ask({"q": HOME})["q"] is not None
+            assert clients[0].ask({"q": HOME})["q"] is not None
+            with Client(port) as other:
+                assert other.ask({"token": TOKEN})["error"] == "more than 2 connections"
+        assert idle[-1].ask({"token": "wrong"})["error"] == "the token is wrong"
 
 
 def test_clients_that_vanish_leave_no_trace(port):

@@ -3,21 +3,37 @@
 import re
 import string
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
 from truearm.errors import InputError
 
 NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+EXPONENT: Final = re.compile(r"\d[eE][+-]?\d")
+DECIMALS: Final = 9
+"""Of numbers in fields that name no format: fine enough for rad and m."""
+SMALL, USUAL = 1e-7, 45.0
+"""Readings: one that a joint has at what should be zero, and one as it has elsewhere."""
+
+
+class _Decimals(string.Formatter):
+    """Fills templates; numbers without a format have decimals, never an exponent."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:  # noqa: ANN401 - as string.Formatter has it
+        if format_spec or not isinstance(value, float):
+            return super().format_field(value, format_spec)
+        # Adding zero makes a zero of a negative one.
+        text = f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0")
+        return f"{text}0" if text.endswith(".") else text
 
 
 def filled(template: str, values: Mapping[str, float]) -> str:
-    """A command with its numbers.
+    """A command with its numbers: in decimals, where a field names no format.
 
     Raises:
         InputError: If the template names a value that there is not.
     """
     try:
-        return template.format(**values)
+        return _Decimals().format(template, **values)
     except (KeyError, IndexError, ValueError, AttributeError, TypeError) as error:
         raise InputError(
             f'"{template}" cannot be filled: {error}', rule=f"Known here: {', '.join(values)}"
@@ -25,12 +41,23 @@ def filled(template: str, values: Mapping[str, float]) -> str:
 
 
 def check_template(template: str, known: Sequence[str], needed: Sequence[str] = ()) -> None:
-    """Raise InputError unless a template can be filled with known numbers, and names all needed ones."""
+    """Raise InputError unless a template can be filled with known numbers, and names all needed ones.
+
+    A format that writes small numbers alone with an exponent, such as g, is not known to be wanted: it is an
+    error as well.
+    """
     filled(template, dict.fromkeys(known, 0.0))
     named = {name for _, name, _, _ in string.Formatter().parse(template)}
     missing = [name for name in needed if name not in named]
     if missing:
         raise InputError(f'"{template}" leaves out {{{missing[0]}}}', rule=f"It names {', '.join(needed)}")
+    small, usual = (filled(template, dict.fromkeys(known, value)) for value in (SMALL, USUAL))
+    if len(EXPONENT.findall(small)) > len(EXPONENT.findall(usual)):
+        raise InputError(
+            f'"{template}" writes small numbers with an exponent: {small}',
+            rule="Most controllers read decimals alone",
+            way_out="Name decimals, as {q1:.4f}, or an exponent for all numbers, as {q1:.6e}",
+        )
 
 
 def expression(text: str) -> str:

@@ -27,6 +27,8 @@ class Prediction:
         world_from_base: Where the base stands (4, 4), as well as is known; None where nothing is.
         is_registered: Whether that comes from contacts.
         radius_m: How far the target may be from where the nominal arm has it.
+        turned_rad: By how much the tool may be turned from there; nothing once the frame is registered, when
+            trying tells more.
         likely_m: How far a reading may be from what is predicted without being suspicious; infinite where
             nothing is known.
     """
@@ -40,9 +42,10 @@ class Prediction:
         )
         self.is_registered = False
         self.radius_m = to_si(process.expected_mm, "mm")
+        self.turned_rad = 0.0
         if world is not None:
-            turned = np.radians(world.uncertain_deg) * REACH_M
-            self.radius_m += to_si(world.uncertain_mm, "mm") + float(turned)
+            self.turned_rad = float(np.radians(world.uncertain_deg))
+            self.radius_m += to_si(world.uncertain_mm, "mm") + self.turned_rad * REACH_M
         self.likely_m = np.inf if world is None else self.radius_m
         self._registered_m = self.likely_m
         self._calibration: Calibration | None = None
@@ -50,7 +53,7 @@ class Prediction:
 
     def register(self, world_from_base: Floats, residual_m: float) -> None:
         """Take over the registered frame."""
-        self.world_from_base, self.is_registered = world_from_base, True
+        self.world_from_base, self.is_registered, self.turned_rad = world_from_base, True, 0.0
         self._seen = self._cell.target_seen_from(world_from_base)
         expected = to_si(self._cell.file.process.expected_mm, "mm")
         self.radius_m = self.likely_m = self._registered_m = max(expected, SIGMAS * residual_m)
@@ -72,7 +75,7 @@ class Prediction:
         point, direction = self._seen(step.readings)
         if self.world_from_base is None:
             return Expected(step.readings, np.zeros(3), np.inf, direction, step.approach)
-        return Expected(step.readings, point, self.radius_m, direction, step.approach)
+        return Expected(step.readings, point, self.radius_m, direction, step.approach, self.turned_rad)
 
     def point(self, expected: Expected) -> Floats:
         """The point (3,) by which a reading is judged."""

@@ -29,6 +29,7 @@ class Expected:
         radius_m: How far from there it may be.
         pointing_in_world: Unit vector (3,) along the tool, from flange to target.
         approach: From which side joints come: 1 from lower readings, -1 from higher, 0 from anywhere.
+        turned_rad: By how much the tool may be turned from there.
     """
 
     readings: Floats
@@ -36,6 +37,7 @@ class Expected:
     radius_m: float
     pointing_in_world: Floats
     approach: int = 0
+    turned_rad: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

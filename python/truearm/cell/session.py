@@ -1,7 +1,8 @@
 """The session file: everything a measurement process has found out, on disk before the next motion starts.
 
-SQLite in write-ahead mode with full synchronisation: what was committed outlives process and power. When the
-writer closes it, it is one file that can be read from where nothing can be written.
+SQLite in write-ahead mode with full synchronisation: what was committed outlives process and power, and
+whoever reads for long does not hold up the writer. Each commit is brought from the log into the file at once.
+When the writer closes it, it is one file that can be read from where nothing can be written.
 """
 
 import json
@@ -20,7 +21,15 @@ from filelock import FileLock, Timeout
 
 from truearm.cell.reading import Reading
 from truearm.cell.session_checks import PUT_BACK, check_values, unreadable, value_of
-from truearm.cell.session_opening import connected, opened_to_read
+from truearm.cell.session_opening import (
+    HEAD_BYTES,
+    MAGIC,
+    TO_WRITE,
+    check_no_logs,
+    connected,
+    opened_to_read,
+    told_lost_log,
+)
 from truearm.cell.session_schema import SCHEMA, VERSION
 from truearm.errors import InputError, WorkError
 from truearm.rotations import quaternion_from_matrix
@@ -57,7 +66,6 @@ MOVE_BACK: Final = (
     "UPDATE events SET step = -step WHERE step < 0",
 )
 NO_FEATURES: Final = "{}"
-MAGIC: Final = b"SQLite format 3\x00"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +90,12 @@ class Stored(NamedTuple):
 
 
 class Session:
-    """A session file, open for writing by one process at a time, or for reading by any."""
+    """A session file, open for writing by one process at a time, or for reading by any.
+
+    Attributes:
+        path: The file.
+        notices: What is to be known of the file.
+    """
 
     def __init__(self, path: Path, *, writing: bool, lock: FileLock | None = None) -> None:
         """Open a file that exists.
@@ -101,11 +114,12 @@ class Session:
             what = "this is a directory" if path.is_dir() else "there is no such file"
             raise InputError(what, where=str(path))
         with path.open("rb") as file:
-            if file.read(len(MAGIC)) != MAGIC:
+            head = file.read(HEAD_BYTES)
+            if not head.startswith(MAGIC):
                 raise InputError(
                     "this is no session file", where=str(path), rule="truearm measure makes them"
                 )
-        self.path = path
+        self.path, self.notices = path, told_lost_log(path, head)
         self._keeps = writing
         self._lock = (lock or _locked(path)) if writing else None
         self._db = connected(path, "mode=rwc") if writing else opened_to_read(path)
@@ -113,8 +127,8 @@ class Session:
             self._check_version()
             check_values(self.rows, path)
             if writing:
-                self._write("PRAGMA journal_mode=WAL")
-                self._write("PRAGMA synchronous=FULL")
+                for setting in TO_WRITE:
+                    self._write(setting)
         except BaseException:
             self._keeps = False
             self.close()
@@ -125,7 +139,7 @@ class Session:
         """Make a new file; it is complete, or not there.
 
         Raises:
-            InputError: If it cannot be written.
+            InputError: If it cannot be written, or the log of another session lies there.
             WorkError: If another process has made it, or is about to.
         """
         if not path.parent.is_dir():
@@ -142,6 +156,7 @@ class Session:
                     where=str(path),
                     way_out="Give the same command again to go on with it",
                 )
+            check_no_logs(file)
             neighbour.replace(file)
             return cls(path, writing=True, lock=lock)
         except BaseException as error:
@@ -163,8 +178,8 @@ class Session:
     def close(self) -> None:
         """Close the file and let others write to it.
 
-        What was written is brought into the file itself, unless somebody reads it now: such a file is read
-        where SQLite can make no other beside it.
+        The log is taken away, unless somebody reads now: a file without one is read where SQLite can make no
+        other beside it.
         """
         if self._keeps:
             with suppress(sqlite3.Error):

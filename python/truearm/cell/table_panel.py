@@ -134,13 +134,7 @@ class TablePanel(Managed):
                 where=self._port.where,
                 rule=f"The panel of {across:g} x {along:g} mm must catch it",
             )
-        angle = panel.angle(expected.pointing_in_world)
-        if angle < panel.least_angle_rad:
-            raise RefusedError(
-                f"the pin meets the panel at {np.degrees(angle):.1f} deg",
-                where=self._port.where,
-                rule=f"At least {np.degrees(panel.least_angle_rad):g} deg are needed",
-            )
+        self._check_angle(expected)
         carriage = panel.carriage_under(expected.point_in_world, standoff)
         touching = carriage + (standoff + expected.radius_m) * panel.normal
         if not (self._holds(carriage) and self._holds(touching)):
@@ -151,6 +145,18 @@ class TablePanel(Managed):
                 rule=f"It moves from 0, 0, 0 to {self._settings.ranges_mm} mm",
             )
         return carriage
+
+    def _check_angle(self, expected: Expected) -> None:
+        """Raise RefusedError unless the pin meets the panel at the least angle, however it may be turned."""
+        angle, least = self.panel.angle(expected.pointing_in_world), self.panel.least_angle_rad
+        if angle >= least + expected.turned_rad:
+            return
+        by = f", and it may be turned by {np.degrees(expected.turned_rad):.1f}" if expected.turned_rad else ""
+        raise RefusedError(
+            f"the pin meets the panel at {np.degrees(angle):.1f} deg",
+            where=self._port.where,
+            rule=f"At least {np.degrees(least):g} deg are needed{by}",
+        )
 
     def _holds(self, carriage: Floats) -> bool:
         """Whether a place (3,) is within the table's ranges; plain numbers are quicker for so few."""

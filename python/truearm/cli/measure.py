@@ -58,13 +58,13 @@ def command(
     wanted = Poses.read_csv(poses, known.arm)
     warn(_told_at_limits(wanted))
     if dry_run:
-        warn(_told_coarse(known))
         _print_rehearsal(known, rehearse(known, wanted), as_json=as_json)
         if not as_json:
             suggest(f"truearm measure {typed(cell)} {typed(poses)} -o {typed(output)}")
         return
     try:
         with open_session(output, known, wanted) as session:
+            warn(session.notices)
             with Teller() as teller:
                 end = run(Process(known, session, teller.tell))
             found = summary_of(session)
@@ -129,6 +129,7 @@ def _below(cell: "Cell", planned: "Planned") -> str:
 
 
 def _print_rehearsal(cell: "Cell", plan: "Rehearsal", *, as_json: bool) -> None:
+    warn(_told_coarse(cell))
     if as_json:
         rows = [
             {

@@ -45,7 +45,7 @@ def command(
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))
     write_whole(target, exported(table))
-    warn([*([_told_of(moved)] if moved else []), *told_unchecked(unchecked)])
+    warn([*known.notices, *([_told_of(moved)] if moved else []), *told_unchecked(unchecked)])
     if as_json:
         rows = {"rows": len(table), "moved": moved, "unchecked": unchecked}
         print_json({"measurements": str(target), **rows})

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
-from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.errors import UsageError, count_of, typed
 from truearm.units import MM_PER_METRE
 
@@ -37,6 +37,7 @@ def command(
     from truearm.cell.session import Session
 
     with Session(session, writing=False) as known:
+        warn(known.notices)
         if pose is not None:
             _show_pose(known, pose, as_json=as_json)
         else:

@@ -1,5 +1,6 @@
 """Frames that were found, written into a frames file beside what it holds already."""
 
+import os
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from tomlkit.items import Item
 from truearm.errors import Notice, UsageError
 from truearm.files import parsed, read_text, write_whole
 from truearm.framing.identified_frame import IdentifiedFrame
+from truearm.locks import held
 from truearm.programs.environment import Frame
 from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, WORLDS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
@@ -23,6 +25,8 @@ from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 PLACEMENT: Final = ("xyz", *ORIENTATIONS)
 FORMAT: Final = 1
+WAIT_S: Final = 30.0
+"""For how long a process waits for others that write into the same file, each for a fraction of a second."""
 DECIMALS: Final = 6
 CONTROLLERS: Final = (
     'already; what it held stands under "controller" now, as what the controller computes with. Take it out '
@@ -58,21 +62,33 @@ def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: 
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
     what the controller has, or was found too: then the new numbers replace it. An object is written in the
-    controller's world where the file has that. Comments of the file stay where they can.
+    controller's world where the file has that. Comments of the file stay where they can. Processes that
+    write into the same file do so one after another, and what each of them found is in it.
 
     Raises:
         UsageError: If the name is blank.
         InputError: If the file breaks a rule or cannot be written, or has two worlds.
+        WorkError: If another process does not come to an end of writing into it.
     """
     if not name.strip():
         raise UsageError(f'the name of the {found.kind} is "{name}"', rule="Programs call it by a name")
-    held = _text(Path(path))
-    content = parsed(held, where=str(path))
-    world = _world(held, found.kind, name, where=str(path))
+    place = os.path.realpath(path)
+    lock = held(place, "writes into this file", where=str(path), wait_s=WAIT_S)
+    try:
+        return _written(path, name, found, data_hash)
+    finally:
+        lock.release()
+
+
+def _written(path: str | Path, name: str, found: IdentifiedFrame, data_hash: str) -> list[Notice]:
+    """Read a file, put a frame into it and write it, as write_frame."""
+    before = _text(Path(path))
+    content = parsed(before, where=str(path))
+    world = _world(before, found.kind, name, where=str(path))
     told = found if world is None else found.told_in(world.true)
     identified = _identified(told, data_hash, "base" if world is None else f"world, {world.name}")
     words = _put(content, name, told, identified)
-    edited = _edited(held, lambda document: _put(document, name, told, identified))
+    edited = _edited(before, lambda document: _put(document, name, told, identified))
     text = edited if _says(edited, content) else tomli_w.dumps(content)
     Frames.parse(text, where=str(path))
     write_whole(Path(path), text)

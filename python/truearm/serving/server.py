@@ -23,6 +23,7 @@ from truearm.serving.vanished import probe
 from truearm.streaming import CorrectionStream
 
 DISCARDED_BYTES: Final = 65_536
+GIVES_WAY: Final = "newer connections came before the token"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Bounds:
     Attributes:
         line_bytes: Longest line.
         requests_per_s: Requests in a second; seconds begin with the first request after the one before.
-        connections: Connections at once.
+        connections: Connections at once that are served.
+        waiting: Others at once, whose token has not come or that are turned away; the oldest gives way.
         token_s: Time to send the token.
         reading_s: Time to take an answer off the line.
         vanished_s: Time for which the system of a client may answer nothing, not even a probe.
@@ -41,6 +43,7 @@ class Bounds:
     line_bytes: int = 16_384
     requests_per_s: int = 5000
     connections: int = 16
+    waiting: int = 16
     token_s: float = 5.0
     reading_s: float = 1.0
     vanished_s: float = 30.0
@@ -91,7 +94,8 @@ class Server:
         self._units = Units(robot.joints)
         self._bounds = bounds or Bounds()
         self._told = told
-        self._connections = 0
+        self._served_now = 0
+        self._waiting: dict[asyncio.StreamWriter, None] = {}
 
     async def start(self, host: str, port: int) -> asyncio.Server:
         """Listen; port 0 takes a free one.
@@ -106,15 +110,26 @@ class Server:
             raise InputError(f"cannot listen there: {error}", where=where, way_out="Name another") from None
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._connections += 1
+        self._make_room()
+        self._waiting[writer] = None
         try:
             await self._answered(reader, writer)
         except asyncio.CancelledError:
             # The server ends. Python 3.11 prints a traceback for a connection that says it was cancelled.
             self._told(f"{_peer(writer)}: the server ends; connection closed")
         finally:
-            self._connections -= 1
+            self._waiting.pop(writer, None)
             writer.close()
+
+    def _make_room(self) -> None:
+        """Have the oldest connection without a token, or turned away, give way to another one."""
+        if len(self._waiting) < self._bounds.waiting:
+            return
+        oldest = next(iter(self._waiting))
+        del self._waiting[oldest]
+        self._told(f"{_peer(oldest)}: {GIVES_WAY}; connection closed")
+        oldest.write(line_of({"error": GIVES_WAY}))
+        oldest.transport.abort()
 
     async def _answered(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve a connection until it ends, or breaks the rules and is told so."""
@@ -129,10 +144,19 @@ class Server:
             self._told(f"{_peer(writer)}: left")
 
     async def _served(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self._connections > self._bounds.connections:
-            raise MalformedError(f"more than {self._bounds.connections} connections")
         if self._token is not None:
             await self._check_token(reader, self._token)
+        if self._served_now >= self._bounds.connections:
+            raise MalformedError(f"more than {self._bounds.connections} connections")
+        self._waiting.pop(writer, None)
+        self._served_now += 1
+        try:
+            await self._corrected(reader, writer)
+        finally:
+            self._served_now -= 1
+
+    async def _corrected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer requests until the connection ends, or one is malformed."""
         stream, flood, before = self._make_stream(), Flood(self._bounds.requests_per_s), None
         await self._send(writer, line_of(self._greeting(list(stream.features))))
         while True:
