@@ -49,6 +49,6 @@ class UpdateOptions:
 
     @property
     def are_narrow(self) -> bool:
-        """Whether something may have moved less far than by default."""
+        """Internal: whether something may have moved less far than by default."""
         usual = {field.name: field.default for field in fields(self)}
         return any(getattr(self, name) < usual[name] for name in SIZES)
