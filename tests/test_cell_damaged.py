@@ -105,6 +105,7 @@ def test_commands_say_that_a_file_is_damaged_and_what_can_be_done(finished, copi
         ("meta SET value = '' WHERE key = 'target'", "meta: target is ''"),
         ("meta SET value = '3' WHERE key = 'arm'", "meta: arm is '3'"),
         ("meta SET value = '\"far\"' WHERE key = 'drift_mm'", "meta: drift_mm is"),
+        ("meta SET value = '1e300' WHERE key = 'created_s'", "meta: created_s is"),
         ("meta SET value = 'one' WHERE key = 'version'", "layout None"),
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from itertools import islice
 from unittest.mock import Mock
 
@@ -150,11 +151,47 @@ def test_what_was_measured_before_a_failed_check_is_a_set_up_of_its_own(recorded
     assert json.loads(said.out)["moved"] == [6, 7, 8]
     assert "Warning: poses 6, 7 and 8: something moved" in said.err
     data = ta.Measurements.read_csv(output)
-    assert data.groups == ["session", "session, moved 1"]
-    np.testing.assert_array_equal(np.flatnonzero(data.group == "session, moved 1"), [5, 6, 7])
+    place, moved = data.groups
+    assert moved == f"{place}, moved 1"
+    np.testing.assert_array_equal(np.flatnonzero(data.group == moved), [5, 6, 7])
     with recorded.read() as session:
         assert len(measurements_of(session)) == COUNT - 3
-    assert main(["session", "export", str(recorded.session), "-o", str(output), "--json"]) == 0
+    again = recorded.folder / "again.csv"
+    assert main(["session", "export", str(recorded.session), "-o", str(again), "--json"]) == 0
+    assert again.read_bytes() == output.read_bytes()
+
+
+@pytest.mark.parametrize(("group", "common"), [(None, set()), ("hall 2", {"hall 2"})])
+def test_sessions_in_which_something_moved_share_no_more_than_what_their_poses_are_meant_for(
+    group, common, tmp_path
+):
+    groups, tables = [], []
+    for day in ("monday", "tuesday"):
+        (tmp_path / day).mkdir()
+        recorded = Recorded(tmp_path / day)
+        recorded.poses = replace(recorded.poses, group=group)
+        text = f"{CELL}check_every = 5\n"
+        recorded.killed(until="pose 8 stored", text=text)
+        with pytest.raises(WorkError, match="the first contact is now"):
+            recorded.measure("moved", text=text)
+        recorded.measure(text=text)
+        with recorded.read() as session:
+            tables.append(accepted_table(session).drop(columns=["step", "pose"]))
+        groups.append(set(tables[-1]["group"]))
+    both = ta.Measurements.concatenate([ta.Measurements.from_dataframe(table) for table in tables])
+    assert [len(each) for each in groups] == [2, 2]
+    assert groups[0] & groups[1] == common
+    assert len(both.groups) == 4 - len(common)
+
+
+def test_a_session_that_has_lost_when_it_began_cannot_name_what_moved(recorded):
+    recorded.killed(until="pose 8 stored")
+    with pytest.raises(WorkError, match="the first contact is now"):
+        recorded.measure("moved")
+    with closing(sqlite3.connect(recorded.session, isolation_level=None)) as older:
+        older.execute("DELETE FROM meta WHERE key = 'created_s'")
+    with recorded.read() as session, pytest.raises(InputError, match="meta holds no created_s"):
+        accepted_table(session)
 
 
 def test_a_finished_session_whose_last_check_failed_says_so_again(recorded):

@@ -313,6 +313,7 @@ def test_wrong_proposals_are_told(words, message, calib, capsys):
     [
         (["ur10", "-n", "7"], 1, "7 poses have 21 measured values. 25 unknowns .* Choose 9 poses or more"),
         (["ur10", "-n", "20", "--sigma-mm", "0"], 2, "sigma_mm: 0. It must be positive"),
+        (["ur10", "-n", "20", "--sigma-mm", "1e-300"], 2, "sigma_mm: 1e-300. At least 1e-06 and at most"),
         (["ur10", "-n", "20", "--sigma-mm", "nan"], 2, "sigma_mm: nan. It must be positive"),
         (["-n", "9", "--next", "5", "--from", "arm.calib"], 2, "--next or --acceptance says how many"),
         (["--next", "5", "--acceptance", "5", "--from", "arm.calib"], 2, "one at a time"),

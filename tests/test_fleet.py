@@ -6,6 +6,8 @@ import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 from contextlib import contextmanager
 from typing import Any
 
@@ -74,6 +76,19 @@ def runs(plant):
     later = HEAD.replace("{arm}.csv", "{arm}-l*.csv") + 'previous = "first/{arm}/calibration.calib"\n'
     text = later + arms("R1", "R2", "R3", "R4")
     return first, run_fleet(Fleet.from_toml(text, folder=plant), plant / "second", workers=1)
+
+
+def test_a_program_without_a_guard_runs_a_fleet(plant, tmp_path):
+    (tmp_path / "fleet.toml").write_text(HEAD.replace("{arm}", str(plant / "{arm}")) + arms("R1", "R2"))
+    text = (
+        "from truearm.fleet import Fleet, run_fleet\n"
+        "run = run_fleet(Fleet.load('fleet.toml'), 'results', workers=2)\n"
+        "print([arm.verdict for arm in run.arms])\n"
+    )
+    (tmp_path / "program.py").write_text(text)
+    command = [sys.executable, "program.py"]
+    done = subprocess.run(command, check=False, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("['good', 'good']\n", "")
 
 
 @pytest.fixture

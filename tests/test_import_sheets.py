@@ -3,14 +3,17 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
-from truearm.importing import import_table
+from truearm.importing import Imported, ImportPlan, import_table
 from truearm.tables.raw_tables import Marks
+from truearm.tables.rotation_columns import RotationColumns
 
 HEAD, FIRST, *REST = PLAIN.splitlines(keepends=True)
 MAPS = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
@@ -108,3 +111,63 @@ def test_words_that_are_stated_for_one_of_two_tables_are_told_if_no_cell_says_th
         both = plan(second=points, second_marks=Marks(missing=theirs), missing=ours)
         found = [notice.message for notice in import_table(first, both).notices]
         assert " ".join(message.split()[-2] for message in found) == unsaid
+
+
+def read_with(tmp_path: Path, text: str, *missing: str, **changes: Any) -> Imported:
+    """What `import` makes of a table in our columns, deg and mm, where numbers say that nothing was seen."""
+    marks = Marks(missing=missing)
+    return import_table(
+        write(tmp_path, text), ImportPlan(joint_unit="deg", length_unit="mm", marks=marks, **changes)
+    )
+
+
+OURS = "q1,q2,x,y,z"
+
+
+def test_a_zero_that_says_nothing_was_measured_is_a_whole_point_and_no_joint(tmp_path: Path) -> None:
+    text = f"{OURS},group,load\n10,20,400,5,6,0,0\n0,21,0,0,0,0,5\n0,22,0,15,16,0,5\n"
+    found = read_with(tmp_path, text, "0", keep={"load": "load"})
+    np.testing.assert_allclose(found.frame[["q1", "q2"]], np.radians([[10, 20], [0, 22]]))
+    np.testing.assert_allclose(found.frame[["x", "y", "z"]], [[0.4, 0.005, 0.006], [0.0, 0.015, 0.016]])
+    assert found.frame["group"].tolist() == ["0", "0"]
+    assert found.frame["load"].tolist() == [0.0, 5.0]
+    assert [words.split(" of ")[0] for words in found.left_out] == ["row 2"]
+    (notice,) = found.notices
+    assert notice.kind == "missing_stays"
+    assert notice.message.startswith('column "load" says 0 in row 1, which stays a number')
+
+
+def test_one_of_two_points_may_be_missing_by_zeros(tmp_path: Path) -> None:
+    text = f"{OURS},x2,y2,z2\n10,20,1,2,3,0,0,0\n11,21,0,0,0,4,5,6\n"
+    frame = read_with(tmp_path, text, "0").frame
+    assert frame[["x", "x2"]].isna().to_numpy().tolist() == [[False, True], [True, False]]
+
+
+def test_other_numbers_of_kept_columns_are_gaps_and_told_and_of_joints_and_parts_stay(tmp_path: Path) -> None:
+    text = f"{OURS},temp\n10,-99,1,2,3,20\n11,21,-99,-99,-99,-99\n12,22,-99,5,6,-99.0\n"
+    found = read_with(tmp_path, text, "-99", keep={"temp": "temp"})
+    np.testing.assert_array_equal(found.frame["temp"], [20.0, np.nan])
+    np.testing.assert_allclose(found.frame["q2"], np.radians([-99.0, 22.0]))
+    assert found.frame["x"].tolist() == [0.001, -0.099]
+    assert [(notice.kind, notice.message.split(",")[0]) for notice in found.notices] == [
+        ("missing_stays", 'column "q2" says -99 in row 1'),
+        ("missing_stays", 'column "x" says -99 in row 3'),
+        ("missing_kept", 'column "temp" says -99 in row 3'),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rotation", "gap", "stays"),
+    [
+        ("vector:rad=a,b,c", "-9,-9,-9,", False),
+        ("euler:XYZ:deg=a,b,c", "0,0,0,", True),
+        ("quaternion:wxyz=a,b,c,d", "0,0,0,0", False),
+    ],
+)
+def test_orientations_are_missing_as_a_whole(rotation: str, gap: str, stays: bool, tmp_path: Path) -> None:
+    text = f"{OURS},a,b,c,d\n10,20,1,2,3,{gap}\n11,21,4,5,6,1,0,0,0\n"
+    found = read_with(tmp_path, text, "0", "-9", rotation=RotationColumns.parse(rotation))
+    assert found.frame["qw"].isna().tolist() == [not stays, False]
+    assert [notice.kind for notice in found.notices if "--missing" not in notice.message] == [
+        "missing_stays"
+    ] * stays

@@ -76,6 +76,14 @@ WRONG = {
         lambda: api.UpdateOptions(tool_mm=np.inf),
         "tool_mm: inf. It must be positive and finite",
     ),
+    "a repeatability below all sizes": (
+        lambda: api.CalibrationOptions(repeatability_mm=5e-324),
+        "repeatability_mm: 4.94066e-324. At least 1e-06 and at most 1,000,000, in mm",
+    ),
+    "a prior beyond all sizes": (
+        lambda: api.CalibrationOptions(prior_mrad=1e300),
+        r"prior_mrad: 1e\+300. At least 1e-06 and at most 1,000,000, in mrad",
+    ),
     "a spacing that is infinite": (
         lambda: Spacing.of(0.1, np.inf),
         "--least-spacing-mm: inf. It must be positive and finite",

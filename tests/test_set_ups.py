@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -39,6 +40,36 @@ def test_few_rows_join_the_set_up_that_their_group_names(arm, tmp_path):
     found = ta.calibrate(arm.robot, data, model="constant")
     assert found.groups == ("monday",)
     assert found.validation.holdout["constant"].position.max < 2.0
+
+
+def test_the_group_of_a_file_means_the_set_up_of_another_that_has_its_name(arm, tmp_path):
+    paths = [tmp_path / day / "measurements.csv" for day in ("day1", "day2", "day3")]
+    for seed, path in enumerate(paths):
+        path.parent.mkdir()
+        written(arm.measure_table(arm.poses((60, 5, 30)[seed], seed=seed), seed=seed), path)
+    assert ta.Measurements.read_files(paths).groups == list(map(str, paths))
+    written(pd.read_csv(paths[1]).assign(group="measurements"), paths[1])
+    data = ta.Measurements.read_files(paths[:2])
+    assert data.groups == ["measurements"]
+    found = ta.calibrate(arm.robot, data, model="constant")
+    assert found.validation.holdout["constant"].position.max < 2.0
+    again = ta.Measurements.concatenate([data.select(slice(60)), ta.Measurements.read_csv(paths[1])])
+    assert again.groups == ["measurements"]
+
+
+def test_a_group_that_two_files_have_the_name_of_is_asked_for(arm, tmp_path):
+    paths = [tmp_path / day / "measurements.csv" for day in ("day1", "day2", "day3")]
+    for seed, path in enumerate(paths):
+        path.parent.mkdir()
+        written(arm.measure_table(arm.poses(5, seed=seed), seed=seed), path)
+    written(pd.read_csv(paths[1]).assign(group="measurements"), paths[1])
+    words = (
+        r'day2/measurements.csv": column "group" says "measurements", as ".*day1.*" and ".*day3.*" are called'
+    )
+    with pytest.raises(ta.InputError, match=words):
+        ta.Measurements.read_files(paths)
+    written(pd.read_csv(paths[0]).assign(group="measurements"), paths[0])
+    assert ta.Measurements.read_files(paths).groups == ["measurements"], "the stem of the only one without"
 
 
 def test_a_set_up_without_orientations_leaves_nothing_open_that_was_measured(arm):

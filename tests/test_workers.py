@@ -106,6 +106,57 @@ def test_closing_ends_the_processes(tmp_path):
     assert not alive(worker)
 
 
+def ran_as_program(folder, text, way):
+    """What a program prints on stdout and stderr, from a file or from standard input."""
+    (folder / "program.py").write_text(text)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "program.py" if way == "file" else "-"]
+    given = text if way == "standard input" else ""
+    done = subprocess.run(
+        command,
+        check=False,
+        input=given,
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=LONG_S,
+    )
+    return done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("way", ["file", "standard input"])
+def test_tasks_of_truearm_need_no_guard(tmp_path, way):
+    text = (
+        "from truearm.errors import typed\nfrom truearm.workers import run_tasks\nprint('began')\n"
+        "print(sorted(done.result() for done in run_tasks(typed, ['b', 'a b'], workers=2)))\n"
+    )
+    stdout, stderr = ran_as_program(tmp_path, text, way)
+    assert (stdout.splitlines(), stderr) == (["began", """["'a b'", 'b']"""], "")
+
+
+@pytest.mark.parametrize("way", ["file", "standard input"])
+def test_other_functions_without_a_guard_are_told_of_it(tmp_path, way):
+    text = (
+        "from truearm.workers import run_tasks\ndef square(number):\n    return number**2\n"
+        "for done in run_tasks(square, range(20), workers=2):\n    print(done.error)\n"
+    )
+    stdout, stderr = ran_as_program(tmp_path, text, way)
+    assert stdout == ""
+    assert "a worker ended before its first task" in stderr
+    assert 'if __name__ == "__main__":' in stderr
+    assert "memory" not in stderr
+
+
+def test_a_program_finds_its_own_functions_under_its_guard(tmp_path):
+    text = (
+        "from truearm.workers import run_tasks\ndef square(number):\n    return number**2\n"
+        "if __name__ == '__main__':\n"
+        "    print(sorted(done.result() for done in run_tasks(square, range(4), workers=2)))\n"
+    )
+    assert ran_as_program(tmp_path, text, "file") == ("[0, 1, 4, 9]\n", "")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_processes_are_gone_with_their_parent(tmp_path, number):
     script = (

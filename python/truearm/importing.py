@@ -32,6 +32,7 @@ from truearm.tables.columns import (
     StatedUnits,
 )
 from truearm.tables.measured_fields import read_fields
+from truearm.tables.missing_numbers import Meanings, without_numbers
 from truearm.tables.raw_tables import Marks, RawTable, read_raw
 from truearm.tables.reading import as_number, table_from_frame
 from truearm.tables.rotation_columns import RotationColumns
@@ -127,6 +128,7 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
         table = join_tables(table, read_raw(plan.second, plan.second_marks or plan.marks), plan.on)
     columns: dict[str, Floats | NDArray[np.str_]] = {}
     named = _all_columns(table, plan)
+    table, said = without_numbers(table, _meanings(table, named, plan))
     for ours, theirs in named.items():
         unit = _unit(table, ours, theirs, plan)
         columns[_written(ours, unit)] = _converted(table, ours, theirs, unit)
@@ -148,8 +150,34 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     _check(frame, table)
     left_out, unused = [*table.left_out, *empty], _unused(table, named, plan)
-    notices = [*_unsaid(table), *_kept_as_text(table, plan)]
+    rows = frame.index.to_numpy(dtype=np.int64)
+    of_numbers = (notice for each in said for notice in each.notices(rows))
+    notices = [*_unsaid(table), *of_numbers, *_kept_as_text(table, plan)]
     return Imported(frame.reset_index(drop=True), unused, left_out, table.remarks, notices)
+
+
+def _meanings(table: RawTable, named: Mapping[str, str], plan: ImportPlan) -> Meanings:
+    """What the table's columns mean, for the numbers by which they may say that nothing was measured."""
+    theirs = {ours: _split_unit(table, name)[0] for ours, name in named.items()}
+    points: dict[str, list[str]] = {}
+    for ours, name in theirs.items():
+        if point := TARGET_COLUMN.fullmatch(ours):
+            points.setdefault(point[2] or "", []).append(name)
+    rotation = () if plan.rotation is None else tuple(map(table.existing, plan.rotation.columns))
+    kept = [_split_unit(table, name)[0] for name in plan.keep.values()]
+    key = None if plan.on is None else plan.on.partition("=")[0]
+    return Meanings(
+        joints=tuple(name for ours, name in theirs.items() if JOINT.fullmatch(ours)),
+        points=tuple(map(tuple, points.values())),
+        orientation=rotation or tuple(theirs[name] for name in QUATERNION if name in theirs),
+        has_angles=plan.rotation is not None and bool(plan.rotation.unit),
+        single=tuple(
+            name
+            for ours, name in theirs.items()
+            if any(one.fullmatch(ours) for one in (SIGMA_COLUMN, DISTANCE_COLUMN))
+        ),
+        kept=tuple(name for name in kept if name != key),
+    )
 
 
 def _unsaid(table: RawTable) -> list[Notice]:

@@ -44,6 +44,10 @@ class Kept(Generic[Given, Held]):
 Names = Kept[str | Sequence[str], tuple[str, ...]]
 Numbers = Kept[Iterable[int], tuple[int, ...]]
 
+SIZES: Final = (1e-6, 1e6)
+"""What sizes in mm, deg or mrad are between: a nanometre, and a kilometre. Nothing is known more closely than
+that, and what is far beyond leaves no digits to the numbers that it meets.
+"""
 NO_CHOICES: Final[Mapping[str, Sequence[object]]] = {}
 
 
@@ -96,6 +100,7 @@ def check_values(
     *,
     choices: Mapping[str, Sequence[object]] = NO_CHOICES,
     positive: Sequence[str] = (),
+    sizes: Sequence[str] = (),
     not_negative: Sequence[str] = (),
 ) -> None:
     """Check what the fields of a dataclass hold, once they are of their kinds.
@@ -104,6 +109,7 @@ def check_values(
         options: The dataclass.
         choices: What the fields may hold that are one of a few.
         positive: Names of the numbers that are above zero and finite, or None.
+        sizes: Names of the lengths in mm and angles in deg or mrad that are above zero, or None: as SIZES.
         not_negative: Names of those that are zero or more, and finite, or None.
 
     Raises:
@@ -113,6 +119,8 @@ def check_values(
         check_choice(getattr(options, name), name, known)
     for name in positive:
         check_positive(getattr(options, name), name)
+    for name in sizes:
+        check_size(getattr(options, name), name)
     for name in not_negative:
         if (value := getattr(options, name)) is not None and not 0 <= value < math.inf:
             raise UsageError(f"{value:g}", where=name, rule="Zero or more, and finite")
@@ -122,6 +130,18 @@ def check_positive(value: float | None, name: str) -> None:
     """Raise UsageError unless the argument or option `name` is above zero and finite, or None."""
     if value is not None and not 0 < value < math.inf:
         raise UsageError(f"{value:g}", where=name, rule="It must be positive and finite")
+
+
+def check_size(value: float | None, name: str) -> None:
+    """Raise UsageError unless a length in mm, or an angle in deg or mrad, is as SIZES say, or None."""
+    check_positive(value, name)
+    least, most = SIZES
+    if value is not None and not least <= value <= most:
+        raise UsageError(
+            f"{value:g}",
+            where=name,
+            rule=f"At least {least:g} and at most {most:,.0f}, in {name.rpartition('_')[2]}",
+        )
 
 
 def check_choice(value: object, name: str, known: Sequence[object]) -> None:

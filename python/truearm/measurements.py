@@ -192,8 +192,7 @@ class Measurements:
             UsageError: If a unit or a kind of joint is not known.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
-        file = as_path(path)
-        read = cls._read(file, stated, group=file.stem)
+        read = cls._read(as_path(path), stated)
         read.require_joint_count(joint_count if joints is None else stated.joint_count)
         return read
 
@@ -231,7 +230,8 @@ class Measurements:
     ) -> "Measurements":
         """Read several CSV files and put them together; each without a `group` column is a group of its own.
 
-        Groups are named after their files, with the folders where two files have the same name.
+        Groups are named after their files, with the folders where two such files have the same name, and a
+        `group` column of another file that says such a name means that set-up.
 
         Args:
             paths: The files, or one.
@@ -240,7 +240,7 @@ class Measurements:
             joints: As for read_csv.
 
         Raises:
-            InputError: As for read_csv.
+            InputError: As for read_csv, and as for concatenate.
             UsageError: As for read_csv, and if a file is named twice.
         """
         files = [as_path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
@@ -248,19 +248,15 @@ class Measurements:
         for path, place in zip(files, places, strict=True):
             if places.count(place) > 1:
                 raise UsageError("the file is named twice", where=str(path))
-        stems = [path.stem for path in files]
-        names = [
-            stem if stems.count(stem) == 1 else str(path) for path, stem in zip(files, stems, strict=True)
-        ]
         stated = StatedUnits(length_unit, angle_unit, joints)
-        parts = [cls._read(path, stated, group=name) for path, name in zip(files, names, strict=True)]
+        parts = [cls._read(path, stated) for path in files]
         for part in parts:
             part.require_joint_count(stated.joint_count)
         return cls.concatenate(parts)
 
     @classmethod
-    def _read(cls, path: Path, stated: StatedUnits, *, group: str) -> "Measurements":
-        return cls(**read_fields(read_csv_table(path), stated, default_group=name_in_text(group)))
+    def _read(cls, path: Path, stated: StatedUnits) -> "Measurements":
+        return cls(**read_fields(read_csv_table(path), stated, default_group=name_in_text(path.stem)))
 
     @classmethod
     def from_dataframe(
@@ -308,7 +304,8 @@ class Measurements:
         set-up only if they share rows.
 
         Raises:
-            InputError: If there are no parts or the numbers of joints differ.
+            InputError: If there are no parts, the numbers of joints differ, or a column names a set-up as
+                several files are called whose set-ups no column names.
         """
         return _concatenate([required(part, Measurements, "the measurements") for part in parts])
 

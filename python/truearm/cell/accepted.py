@@ -2,6 +2,7 @@
 
 import json
 import math
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from truearm.cell.checks import unsure_steps
 from truearm.cell.poses_file import GROUP
 from truearm.cell.scatter import sigma_of_mean_m, weighted_mean
 from truearm.cell.session import Session
+from truearm.cell.session_checks import PUT_BACK
+from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.tables.columns import APPROACH, POSE, PURPOSE, READINGS
 from truearm.types import Floats
@@ -29,7 +32,6 @@ COLUMNS = (
     "qw", "qx", "qy", "qz", "sigma", "temperature_c", "features",
 )  # fmt: skip
 TURN = ["qw", "qx", "qy", "qz"]
-SET_UP = "session"
 
 
 def accepted_table(session: Session, kind: str = "pose", *, most: int | None = None) -> pd.DataFrame:
@@ -41,7 +43,8 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
     Where there are purposes, purpose too. sigma is that of the mean.
 
     Poses also have a group where the list of poses gave one, and where something moved: those between a check
-    that found the cell in its place and one that did not are a set-up of their own.
+    that found the cell in its place and one that did not are a set-up of their own. What the list does not
+    name is called after the session.
 
     Args:
         session: The session.
@@ -124,7 +127,25 @@ def _with_group(table: pd.DataFrame, session: Session) -> pd.DataFrame:
     group, moved = session.meta(GROUP), unsure_steps(session)
     if group is None and not moved:
         return table
-    groups = pd.Series(group or SET_UP, index=table.index)
+    name = _name(session)
+    place = f"{group}, {name}" if group else name
+    groups = pd.Series(group or name, index=table.index)
     for number, steps in enumerate(moved, start=1):
-        groups[table["step"].isin(list(steps))] = f"{group or SET_UP}, moved {number}"
+        groups[table["step"].isin(list(steps))] = f"{place}, moved {number}"
     return table.assign(group=groups)
+
+
+def _name(session: Session) -> str:
+    """What sets a session apart from others, whatever its file is called: when it began, to the microsecond.
+
+    Between two sessions device and target may have been put elsewhere; equal groups mean that they were not.
+    """
+    began_s = session.meta("created_s")
+    if began_s is None:
+        raise InputError(
+            "meta holds no created_s",
+            where=str(session.path),
+            rule="Set-ups in which something moved are called after when the session began",
+            way_out=PUT_BACK,
+        )
+    return f"session of {datetime.fromtimestamp(began_s, UTC):%Y-%m-%d %H:%M:%S.%f}"

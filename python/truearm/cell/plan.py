@@ -86,7 +86,7 @@ class PlanOptions:
         settle(self, whole=("count", "seed"), numbers=("sigma_mm", "link_radius_mm"))
         choices = {"order": ORDERS, "criterion": CRITERIA}
         not_negative = ("seed", "link_radius_mm")
-        check_values(self, choices=choices, positive=("sigma_mm",), not_negative=not_negative)
+        check_values(self, choices=choices, sizes=("sigma_mm",), not_negative=not_negative)
         if self.count < 1:
             raise UsageError(count_of(self.count, "pose"), rule="At least one is planned")
 

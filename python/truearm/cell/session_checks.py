@@ -135,6 +135,7 @@ RULES: Final = (
 )
 KEYS: Final = {"registration": "id", "stretches": "measured", "events": "id"}
 """By what rows are named, where that is no step."""
+YEAR_9000_S: Final = 2.2e11
 # NaN and Infinity, which drivers may give, are no JSON for SQLite: such rows are looked at again.
 DOUBTED_FEATURES: Final = (
     "SELECT step, features FROM readings WHERE features != '{}' AND CASE "
@@ -215,8 +216,13 @@ def _is_frame(value: object) -> bool:
     )
 
 
+def _is_moment(value: object) -> bool:
+    return isinstance(value, int | float) and _is_number(value) and 0.0 <= value < YEAR_9000_S
+
+
 HEAD: Final[dict[str, Callable[[object], bool]]] = {
     "arm": lambda value: isinstance(value, dict) and "name" in value,
+    "created_s": _is_moment,
     "drift_mm": _is_number,
     "group": lambda value: value is None or isinstance(value, str),
 }

@@ -218,11 +218,12 @@ def write_results(calibration: "Calibration", output: Path, *, with_rows: bool =
     so that none stands beside a calibration that it is not of.
     """
     summary, content = calibration.summary, calibration.to_bytes(with_rows=with_rows)
+    text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
     make_directory(output)
     _keep_previous(output, content)
     remove(output / REPORT_NAME)
     write_whole(output / CALIBRATION_NAME, content)
-    write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    write_whole(output / SUMMARY_NAME, text)
     make_report(calibration if with_rows else calibration.without_rows(), output / REPORT_NAME)
     return summary
 

@@ -147,11 +147,11 @@ def _write(found: "Update", place: Path) -> None:
     if found.calibration.has_conservative:
         with told_stages()("bounding the standard deviation"):
             _ = found.calibration.conservative
+    text = json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n"
     make_directory(place.parent)
     found.calibration.save(place)
     if place.name == CALIBRATION_NAME:
-        text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
-        write_whole(place.parent / UPDATE_NAME, text + "\n")
+        write_whole(place.parent / UPDATE_NAME, text)
 
 
 def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | None, given: str) -> None:

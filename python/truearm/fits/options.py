@@ -27,7 +27,8 @@ CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "frame": get_args(Frame),
     "degree": (2, 3),
 }
-POSITIVE: Final = ("prior_mm", "prior_mrad", "parallel_within_deg", "repeatability_mm")
+POSITIVE: Final = ("parallel_within_deg",)
+SIZES: Final = ("prior_mm", "prior_mrad", "repeatability_mm")
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,8 @@ class CalibrationOptions:
     def __post_init__(self) -> None:
         kinds.required(self.split, SplitRule, "the split")
         kinds.required(self.scheme, SchemeOptions, "the scheme")
-        kinds.settle(self, whole=("judge_target", "degree"), numbers=POSITIVE, flags=("refit",))
-        kinds.check_values(self, choices=CHOICES, positive=POSITIVE)
+        kinds.settle(self, whole=("judge_target", "degree"), numbers=(*POSITIVE, *SIZES), flags=("refit",))
+        kinds.check_values(self, choices=CHOICES, positive=POSITIVE, sizes=SIZES)
         if self.model in NETWORKS:
             self.scheme.check_network(fuzzy=self.model == FCMAC)
         if len(set(self.features)) < len(self.features):

@@ -5,10 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from truearm.tables.reading import Cells, Table, as_number
+from truearm.types import Floats
 
 
 def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple[Table, tuple[str, ...]]:
-    """The table with empty cells where they say that nothing was measured, and what no cell says.
+    """The table with empty cells where text says that nothing was measured, and what no cell says.
+
+    A number may be one in another column: cells that say one stay, until it is known what columns mean.
 
     Args:
         table: The table.
@@ -18,15 +21,25 @@ def without_missing(table: Table, missing: Sequence[str], decimal: str) -> tuple
     if not missing:
         return table, ()
     stated = {word: _meant(word, decimal) for word in missing}
-    columns, found = dict[str, Cells](), set()
+    words = {one for one in stated.values() if isinstance(one, str)}
+    columns, found = dict[str, Cells](), set[float | str]()
     for name in table.names:
         cells = table.cells(name)
         meant = [_meant(cell, decimal) for cell in cells]
         found |= set(meant).intersection(stated.values())
-        kept = ["" if one in stated.values() else cell for one, cell in zip(meant, cells, strict=True)]
+        kept = ["" if one in words else cell for one, cell in zip(meant, cells, strict=True)]
         columns[name] = np.array(kept, dtype=np.object_)
     left = tuple(word for word, one in stated.items() if one not in found)
     return Table(table.where, columns, table.row_count, table.remarks), left
+
+
+def said_numbers(table: Table, name: str, missing: Sequence[str], decimal: str) -> Floats:
+    """Of each cell of a column (n,) the number by which it says that nothing was measured; NaN of others."""
+    stated = {one for word in missing if isinstance(one := _meant(word, decimal), float)}
+    if not stated:
+        return np.full(table.row_count, np.nan)
+    meant = (_meant(cell, decimal) for cell in table.cells(name))
+    return np.array([one if one in stated else np.nan for one in meant], dtype=np.float64)
 
 
 def _meant(cell: str, decimal: str) -> float | str:

@@ -53,7 +53,7 @@ class Marks:
         skip_lines: Lines before the header.
         comments: What lines begin with that are remarks.
         missing: What cells say, besides nothing, where nothing was measured: a number, however these write
-            it, or a text, of which case does not count.
+            it, where it can mean that (missing_numbers), or a text, of which case does not count.
         encoding: Encoding of the text.
         names: Names of the columns of a table without a header, "-" for those to leave out; () with one.
         sheet: Name of the sheet of a workbook; None takes the only one. Workbooks have no delimiter, and no

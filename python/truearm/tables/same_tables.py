@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import InputError, list_names
 from truearm.types import Texts
 
 if TYPE_CHECKING:
@@ -58,7 +59,11 @@ def copied_rows(data: "Measurements") -> NDArray[np.bool_]:
 
 
 def told_apart(parts: Sequence["Measurements"]) -> list["Measurements"]:
-    """The parts with different names for the set-ups of different files, where no column names them."""
+    """The parts with different names for the set-ups of different files, where no column names them.
+
+    Raises:
+        InputError: If a column names a set-up as several such files are called.
+    """
     known: dict[str, list[Measurements]] = {}
     parts = [_own_table(part, known) for part in parts]
     called = set[tuple[str, str]]()
@@ -66,11 +71,27 @@ def told_apart(parts: Sequence["Measurements"]) -> list["Measurements"]:
         rows = _called_after_file(part)
         called |= set(zip(part.group[rows].tolist(), part.sources[rows].tolist(), strict=True))
     groups, sources = Counter(group for group, _ in called), Counter(source for _, source in called)
+    for part in parts:
+        _check_one_is_meant(part, called, groups)
     unclear = [source for group, source in called if groups[group] > 1 or sources[source] > 1]
     return [
         _renamed(part, _called_after_file(part) & np.isin(part.sources, unclear), group=part.sources)
         for part in parts
     ]
+
+
+def _check_one_is_meant(part: "Measurements", called: set[tuple[str, str]], count: Counter[str]) -> None:
+    """Raise InputError if a column of the part names a set-up as several files are called."""
+    named = ~_called_after_file(part)
+    for group in dict.fromkeys(part.group[named].tolist()):
+        if count[group] > 1:
+            alike = list_names(sorted(source for name, source in called if name == group))
+            raise InputError(
+                f'column "group" says "{group}", as {alike} are called',
+                where=list_names(dict.fromkeys(part.sources[named & (part.group == group)].tolist())),
+                rule="A file without that column is a set-up of its own, called after the file",
+                way_out='Give these files a column "group" too, with equal names for one set-up',
+            )
 
 
 def _own_table(part: "Measurements", known: dict[str, list["Measurements"]]) -> "Measurements":

@@ -60,7 +60,7 @@ MOST_OUTLIERS: Final = 0.2
 FOUND_FROM: Final = 3
 """Poses of a set-up that find its frame and target when others are left out."""
 IMPLAUSIBLE: Final = 5.0
-"""An offset so many prior standard deviations off is not believed."""
+"""An estimate of an offset so many standard deviations off, of what the prior lets it be, is not believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,8 +328,8 @@ class _Found:
         return _with_certainty(told, updated(kept, found, judged, report, notices))
 
     def _slipped(self, found: Estimate) -> list[Slip]:
-        """What stood otherwise from some row on; not what was kept and did so from the first."""
-        if self.options.keep_frame or self.options.keep_tool:
+        """What stood otherwise from some row on; not what was kept, or nearly, and did so from the first."""
+        if self.options.keep_frame or self.options.keep_tool or self.options.are_narrow:
             return slipped_meanwhile(self.calibration, self.rows.scene.data, self.options.use)
         return meanwhile(self.rows.scene, found)
 
@@ -476,16 +476,19 @@ def _outlier_notices(data: Measurements, outliers: Rows) -> list[Notice]:
 
 
 def _check_plausible(scene: Scene, found: Estimate, notices: Sequence[Notice]) -> None:
-    joints = scene.task.arm.robot.joint_count
-    std = np.maximum(scene.unknowns.std[:joints], np.finfo(np.float64).tiny)
-    ratios = np.abs(found.state.arm[:joints]) / std
-    wild = int(np.argmax(ratios))
-    if ratios[wild] > IMPLAUSIBLE:
+    """Raise WorkError where an offset is too far off for what may have moved, as far as the poses tell it."""
+    own = slice(scene.task.arm.robot.joint_count)
+    std, change = scene.unknowns.std[own], np.abs(found.state.arm[own])
+    variance = np.maximum(std**2 - np.diag(found.covariance)[own], np.finfo(np.float64).tiny)
+    surprise = change / np.sqrt(variance)
+    wild = int(np.argmax(surprise))
+    if surprise[wild] > IMPLAUSIBLE:
+        times = change[wild] * std[wild] / variance[wild]
         kept = way_out_of_keeping(scene.unknowns.kept)
         check = f"{kept}; check" if kept else "Check"
         guessed = "".join(f"{notice} " for notice in notices if notice.kind == FEATURE_RANGE)
         raise WorkError(
-            f"joint {wild + 1} would be off by {ratios[wild]:.0f} times what is allowed for",
+            f"joint {wild + 1} would be off by {times:.0f} times what is allowed for",
             where=", ".join(scene.data.files),
             rule=f"Up to {IMPLAUSIBLE:g} times --offset-deg is believed",
             way_out=f"{guessed}{check} that these are measurements of this arm; after a larger change give a "

@@ -9,10 +9,11 @@ import numpy as np
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating.estimating import Estimate, posterior
+from truearm.updating.options import UpdateOptions
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
 from truearm.updating.squares import SquaresTest, student_p, wald
-from truearm.updating.unknowns import Unknowns
+from truearm.updating.unknowns import Unknowns, arm_std
 
 TOLD: Final = 0.5
 """An offset is told when its standard error is below this share of the prior's deviation."""
@@ -123,21 +124,25 @@ class Motion:
 def untold(scene: Scene, scatter: Scatter, state: State) -> dict[int, str]:
     """Joints, from 0, whose offsets the poses do not tell, and what they cannot be told from.
 
-    It depends on the poses and on what may have moved, not on what was measured.
+    It depends on the poses and on what may have moved, not on what was measured. Priors of offsets are as
+    wide as they are by default, at the least: narrower ones are what is known besides, which measurements may
+    contradict.
 
     Args:
         scene: The measurements.
         scatter: What the residuals of an unchanged arm may scatter by.
         state: Where derivatives are taken.
     """
-    unknowns = scene.unknowns
-    covariance = posterior(scene.linear(state), scatter, unknowns.std, unknowns.free)
+    unknowns, std = scene.unknowns, scene.unknowns.std.copy()
     joints = range(scene.task.arm.robot.joint_count)
+    usual = [arm_std(scene.task.arm, unknowns.arm_names[joint], UpdateOptions()) for joint in joints]
+    std[joints] = np.maximum(std[joints], usual)
+    covariance = posterior(scene.linear(state), scatter, std, unknowns.free)
     error = np.sqrt(np.diag(covariance))
     return {
-        joint: _confounded(unknowns, covariance, joint)
+        joint: _confounded(unknowns, covariance, joint, TOLD * std[joint])
         for joint in joints
-        if error[joint] >= TOLD * unknowns.std[joint]
+        if error[joint] >= TOLD * std[joint]
     }
 
 
@@ -252,8 +257,8 @@ def _linearised(function: Callable[[Floats], Floats], at: Floats) -> tuple[Float
     return function(at), np.column_stack(slopes)
 
 
-def _confounded(unknowns: Unknowns, covariance: Floats, joint: int) -> str:
-    """Of frame, or base, and tool what would have to be known for an offset to be told."""
+def _confounded(unknowns: Unknowns, covariance: Floats, joint: int, error: float) -> str:
+    """Of frame, or base, and tool what would have to be known for an offset's error to be below `error`."""
     parts = list(unknowns.parts)
     names, masks = zip(*parts, strict=True)
     parts.append((" and ".join(names), np.logical_or.reduce(masks)))
@@ -264,7 +269,7 @@ def _confounded(unknowns: Unknowns, covariance: Floats, joint: int) -> str:
         across = covariance[joint, known]
         inner = covariance[np.ix_(known, known)]
         left = covariance[joint, joint] - across @ np.linalg.solve(inner, across)
-        if np.sqrt(max(left, 0.0)) < TOLD * unknowns.std[joint]:
+        if np.sqrt(max(left, 0.0)) < error:
             return name
     return ""
 

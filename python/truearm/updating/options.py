@@ -1,16 +1,19 @@
 """How a calibration is updated."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Final
 
 from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError
 from truearm.fits.core_set import Use
 from truearm.kinds import check_values, settle
 
+SIZES: Final = ("offset_deg", "offset_mm", "tool_mm", "tool_deg")
+
 
 @dataclass(frozen=True)
 class UpdateOptions:
-    """What may have moved, and how far.
+    """What may have moved, and how far: lengths and angles are from 1e-6 to 1e6.
 
     Attributes:
         offset_deg: Standard deviation of the change of a revolute joint's offset.
@@ -37,10 +40,15 @@ class UpdateOptions:
     use: Use | None = None
 
     def __post_init__(self) -> None:
-        sizes = ("offset_deg", "offset_mm", "tool_mm", "tool_deg")
-        settle(self, numbers=(*sizes, "level"), flags=("keep_frame", "keep_tool", "new_tool"))
-        check_values(self, positive=sizes)
+        settle(self, numbers=(*SIZES, "level"), flags=("keep_frame", "keep_tool", "new_tool"))
+        check_values(self, sizes=SIZES)
         if not 0.0 < self.level < 1.0:
             raise UsageError(f"{self.level}", where="level", rule="Between 0 and 1, such as 0.01")
         if self.keep_tool and self.new_tool:
             raise UsageError("the tool is kept, and it is new", rule="Give one of keep_tool and new_tool")
+
+    @property
+    def are_narrow(self) -> bool:
+        """Internal: whether something may have moved less far than by default."""
+        usual = {field.name: field.default for field in fields(self)}
+        return any(getattr(self, name) < usual[name] for name in SIZES)

@@ -3,13 +3,15 @@
     def square(number: float) -> float:
         return number**2
 
-    with closing(run_tasks(square, numbers)) as finished:
-        for done in finished:
-            print(numbers[done.index], done.result())
+    if __name__ == "__main__":
+        with closing(run_tasks(square, numbers)) as finished:
+            for done in finished:
+                print(numbers[done.index], done.result())
 
 The function is one of a module's top level, for it is found by its name elsewhere; items and results are sent
-by value. A task does the same wherever it runs: results do not depend on the number of workers, only their
-order does.
+by value. Local processes run the program that asks for them once more, hence the guard; not for functions of
+truearm itself, as `run_fleet` and the studies use them. A task does the same wherever it runs: results do not
+depend on the number of workers, only their order does.
 """
 
 from collections.abc import Callable, Generator, Iterable
@@ -47,7 +49,8 @@ def run_tasks(
         UsageError: If both are given, or there is no worker.
         InputError: When the first result is asked for, if the scheduler does not answer within seconds, or
             dask.distributed is not installed.
-        WorkError: If the scheduler, or all its workers, are lost for long.
+        WorkError: If the scheduler, or all its workers, are lost for long, or a local process ends before its
+            first task, as where the program that asks has no guard.
     """
     _check(scheduler, workers)
     if scheduler is None:

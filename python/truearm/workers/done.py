@@ -80,6 +80,15 @@ def died() -> WorkError:
     )
 
 
+def not_begun() -> WorkError:
+    """The error where a worker ends while it runs the caller's program, from which its task may be."""
+    return WorkError(
+        "a worker ended before its first task",
+        rule="Each worker runs the program that asks for it once more, to find its functions there",
+        way_out='Put what the program, which has to be a file, does under: if __name__ == "__main__":',
+    )
+
+
 def plain(error: BaseException) -> Exception:
     """The error of an item or a result that cannot be sent, or of a task that asked its process to exit."""
     return error if isinstance(error, Exception) else WorkError(f"the task ended with {error!r}")
