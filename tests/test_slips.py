@@ -13,6 +13,7 @@ from truearm.cli.calibrate import suggest_next
 from truearm.doubts.at_once import (
     JOINT,
     JOINT_MOVED,
+    SCALE_DIFFERS,
     SETUP_TURNED,
     STEP_KINDS,
     TARGET,
@@ -21,7 +22,7 @@ from truearm.doubts.at_once import (
     Shape,
     likeliest_step,
 )
-from truearm.doubts.moved_joints import JOINTS_MOVED
+from truearm.doubts.moved_words import JOINTS_MOVED, SETUP_TURNING
 from truearm.doubts.tool_slips import tool_slips
 from truearm.fleet.doubted import grave_notices
 from truearm.programs.notices import update_notices
@@ -39,6 +40,8 @@ from truearm.update_words import MEANWHILE
 
 ROWS = 50
 HALF = ROWS // 2
+LONG = 90
+"""Rows that leave enough of a scale or a slow turn, which what varies follows in few."""
 SLIP = np.array([0.4, 0.0, 0.3]) * 1e-3
 """How far the target slips, m."""
 
@@ -60,8 +63,8 @@ def with_slip(arm, data, first=HALF):
     return replace(data, targets=data.targets + by[:, None])
 
 
-def with_groups(data):
-    return replace(data, group=np.where(np.arange(len(data)) < HALF, "before", "behind"))
+def with_groups(data, first=HALF):
+    return replace(data, group=np.where(np.arange(len(data)) < first, "before", "behind"))
 
 
 def calibrated(arm, data):
@@ -136,7 +139,7 @@ def test_a_joint_that_moves_at_once_does_not_warm_up(arm, grouped):
     assert said.startswith((where, "In before, against the other"))
     size = float(said.split("joint 2 moved by ")[1].split(" deg")[0])
     assert abs(size) == pytest.approx(0.03, rel=0.15)
-    assert "calibrate from those behind alone" in said
+    assert ("calibrate from those behind alone" in said) is not grouped
 
 
 def test_a_joint_that_moves_is_told_by_its_reading_where_that_turns_others_and_counts_the_other_way(arm):
@@ -157,6 +160,40 @@ def test_a_device_that_turns_is_told(arm, steady):
     targets[HALF:] = targets[HALF:] @ turn.T
     _, notices = calibrated(arm, replace(steady, targets=targets))
     assert "between row 25 and row 26" in notices[SETUP_TURNED].lower()
+
+
+@pytest.fixture(scope="module")
+def long(arm):
+    return arm.measure(arm.poses(LONG))
+
+
+def test_a_device_that_turns_all_the_while_gave_way_at_no_row(arm, long):
+    """About an axis through the device, 0.3 mrad from the first row to the last."""
+    turned = np.outer(np.linspace(0.0, 1.0, LONG), [0.0, 2.4e-4, 1.8e-4])
+    targets = np.einsum("nij,ntj->nti", matrix_from_rotation_vector(turned), long.targets)
+    _, notices = calibrated(arm, replace(long, targets=targets))
+    assert not set(STEP_KINDS) & set(notices)
+    size = notices[SETUP_TURNING].split("turned evenly while it was measured: by ")[1].split(" mrad")[0]
+    assert float(size) == pytest.approx(0.3, rel=0.15)
+
+
+@pytest.mark.parametrize("grouped", [False, True])
+def test_an_instrument_of_another_scale_is_no_joint_that_moves(arm, long, grouped):
+    targets = long.targets.copy()
+    targets[LONG // 2 :] *= 1.0005
+    data = replace(long, targets=targets)
+    found, notices = calibrated(arm, with_groups(data, LONG // 2) if grouped else data)
+    assert set(STEP_KINDS) & set(notices) == {SCALE_DIFFERS}
+    said = notices[SCALE_DIFFERS]
+    where = (
+        ("In behind", "In before") if grouped else ("Between row 45 and row 46", "Between row 44 and row 45")
+    )
+    assert said.startswith(where)
+    longer = said.split("all lengths are ")[1]
+    assert longer.startswith("shorter" if "In before" in said else "longer")
+    assert float(longer.split(" by ")[1].split(" ppm")[0]) == pytest.approx(500.0, rel=0.15)
+    assert "an instrument of another scale" in said
+    assert said in grave_notices(found)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "warnings.md
 CHOSEN = {
     "truearm.drifting": {"drift", "another_place"},
     "truearm.doubts.exchanged": {"rows_exchanged", "targets_exchanged"},
-    "truearm.doubts.slips": {"target_slipped", "joint_moved", "setup_turned"},
+    "truearm.doubts.slips": {"target_slipped", "joint_moved", "setup_turned", "scale_differs"},
+    "truearm.doubts.moved_words": {"joints_moved", "links_grew"},
 }
 """Kinds of notices that a variable holds, by the module that makes these."""
 PASSED_ON = ("notice.kind", "slip.notice.kind", 'content["kind"]')

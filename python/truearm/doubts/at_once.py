@@ -1,8 +1,9 @@
-"""What stands otherwise from some row on: a target on its tool, a joint, the device or the arm's base.
+"""What stands otherwise from some row on: a target on its tool, a joint, the device, a scale.
 
-A target that slips moves along the axes of the flange, a joint turns about its own: neither is the same way
-in the world at all poses, so that no displacement of the set-up follows it. What is left of the rows is
-asked, for each place in the order of measuring, whether it is explained by such a step from there on.
+A target that slips moves along the axes of the flange, a joint turns about its own, and what an instrument of
+another scale measures, or an arm that is warmer reaches, lies farther apart: neither is the same way in the
+world at all poses, so that no displacement of the set-up follows it. What is left of the rows is asked, for
+each place in the order of measuring, whether it is explained by such a step from there on.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,10 +17,12 @@ from truearm.types import AXES, Floats, Rows
 TARGET: Final = "target"
 JOINT: Final = "joint"
 FRAME: Final = "frame"
+SCALE: Final = "scale"
 TARGET_SLIPPED: Final = "target_slipped"
 JOINT_MOVED: Final = "joint_moved"
 SETUP_TURNED: Final = "setup_turned"
-STEP_KINDS: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED)
+SCALE_DIFFERS: Final = "scale_differs"
+STEP_KINDS: Final = (TARGET_SLIPPED, JOINT_MOVED, SETUP_TURNED, SCALE_DIFFERS)
 """Kinds of notices of what stands otherwise from some row on."""
 BESIDE: Final = 5
 """Visits before and behind a step, at the least: fewer are outliers."""
@@ -57,7 +60,7 @@ class Shape:
     """What may stand otherwise.
 
     Attributes:
-        what: TARGET, JOINT or FRAME.
+        what: TARGET, JOINT, FRAME or SCALE.
         numbers: Which targets or joints, from 0.
         columns: Its columns among those that are asked.
     """
@@ -77,6 +80,7 @@ class Step:
         sizes: By how much (k,), in units of its columns.
         share: Part of the squares that it explains.
         gain: Logarithm of its evidence over that of none.
+        tries: How many places and ways were asked for it.
         chance: How likely chance explains as much somewhere, with something.
     """
 
@@ -85,7 +89,21 @@ class Step:
     sizes: Floats
     share: float
     gain: float
+    tries: int
     chance: float
+
+
+def evidence(share: Floats, ranks: Floats, freedom: Floats | float, values: float) -> Floats:
+    """Logarithm of the evidence of explanations over that of none (Schwarz 1978), -inf where there is none.
+
+    Args:
+        share: Part of the squares that each explains (k,).
+        ranks: How many directions it has (k,).
+        freedom: Degrees of freedom that it leaves (k,).
+        values: Those of the residuals.
+    """
+    gain = -0.5 * (freedom * np.log(np.maximum(1.0 - share, NEARLY_NONE)) + ranks * np.log(values))
+    return np.where((ranks > 0) & (freedom > ranks), gain, -np.inf)
 
 
 def likeliest_step(
@@ -95,7 +113,7 @@ def likeliest_step(
 
     It is the score test of generalised least squares: a step is fitted beside all that was fitted, without
     its being searched again, and beside steps of the columns `beside` at the same place, which are told
-    elsewhere. Steps of unlike many columns are compared by their evidence (Schwarz 1978). Several targets
+    elsewhere. Steps of unlike many columns are compared by their evidence. Several targets
     step each by itself or, on a tool that moves, all alike.
 
     Args:
@@ -115,22 +133,20 @@ def likeliest_step(
     told, pull, gram, rank_beside = _without(gram, pull, alone, list(beside))
     found: Step | None = None
     ways = [(shape, along) for shape in shapes for along in _ways(shape)]
+    tries = len(places) * len(ways)
     for shape, along in ways:
         own = list(shape.columns)
         gram_along, alone_along = (along.T @ each[:, own][:, :, own] @ along for each in (gram, alone))
         sizes, squares, ranks = _solved(gram_along, pull[:, own] @ along, alone_along)
         share = squares / np.maximum(np.maximum(left.square - told, squares), NEARLY_NONE)
         free = left.freedom - rank_beside - ranks
-        usable = (ranks > 0) & (free > ranks)
-        gain = -0.5 * (free * np.log(np.maximum(1.0 - share, NEARLY_NONE)) + ranks * np.log(left.freedom))
-        gain = np.where(usable, gain, -np.inf)
+        gain = evidence(share, ranks, free, left.freedom)
         k = int(np.argmax(gain))
         if not np.isfinite(gain[k]) or (found is not None and gain[k] <= found.gain):
             continue
-        chance = float(betaincc(0.5 * ranks[k], 0.5 * free[k], share[k])) * len(places) * len(ways)
-        found = Step(
-            shape, int(places[k]), along @ sizes[k], float(share[k]), float(gain[k]), min(chance, 1.0)
-        )
+        chance = float(betaincc(0.5 * ranks[k], 0.5 * free[k], share[k])) * tries
+        by, told_by = along @ sizes[k], (float(share[k]), float(gain[k]), tries, min(chance, 1.0))
+        found = Step(shape, int(places[k]), by, *told_by)
     return found
 
 

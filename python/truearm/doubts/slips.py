@@ -13,6 +13,8 @@ from truearm.doubts.at_once import (
     FRAME,
     JOINT,
     JOINT_MOVED,
+    SCALE,
+    SCALE_DIFFERS,
     SETUP_TURNED,
     TARGET,
     TARGET_SLIPPED,
@@ -32,7 +34,9 @@ from truearm.robot import Robot
 from truearm.types import AXES, Floats, Mask, Rows
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
-KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED}
+KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED, SCALE: SCALE_DIFFERS}
+OF_ONE_ARM: Final = (JOINT_MOVED, SCALE_DIFFERS)
+"""Kinds of what one set-up shows against others, and these against it."""
 MOSTLY: Final = 0.5
 """Part of the squares that a step explains where a calibration does not help, or rows are outliers, for it to
 be the reason."""
@@ -41,10 +45,9 @@ OWN_GROUP: Final = (
     "Give the rows behind a name of their own in a column `group`: each part then has a frame and a target "
     "of its own."
 )
-ONE_PART: Final = (
-    "Rows of one arm are needed: calibrate from those behind alone, or, where these are few, from the "
-    "others, and bring that up to date with them (truearm update)."
-)
+PER_KELVIN: Final = {"aluminium": 23e-6, "steel": 12e-6}
+"""Part of their length by which links of a material grow."""
+PARTS_PER_MILLION: Final = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,7 @@ class Derivatives:
         points: Which values are coordinates of points, x, y and z one after the other (n,).
         frame: How many unknowns its frame has.
         targets: Which targets of the rows are fitted, from 0.
+        scaled: By a common scale of all lengths (n,), where that is asked.
     """
 
     setup: Floats
@@ -64,23 +68,28 @@ class Derivatives:
     points: Mask
     frame: int
     targets: tuple[int, ...]
+    scaled: Floats | None = None
 
     @property
     def columns(self) -> Floats:
         """All of them (n, p), behind those by a shift of all points."""
         shift = np.zeros((len(self.points), AXES))
         shift[self.points] = np.tile(np.eye(AXES), (self.points.sum() // AXES, 1))
-        return np.hstack([shift, self.setup, self.joints])
+        scaled = [] if self.scaled is None else [self.scaled[:, None]]
+        return np.hstack([shift, self.setup, self.joints, *scaled])
 
     def shapes(self) -> Iterator[Shape]:
-        """What of it may: the frame's turn, all targets or one of them, one joint or all."""
+        """What of it may: the frame's turn, all targets or one of them, one joint or all, the scale."""
         if self.frame == FRAME_UNKNOWNS:
             yield Shape(FRAME, (), tuple(range(2 * AXES, AXES + self.frame)))
         yield from self._of_targets()
         end = AXES + self.setup.shape[1]
         for joint in range(self.joints.shape[1]):
             yield Shape(JOINT, (joint,), (end + joint,))
-        yield Shape(JOINT, tuple(range(self.joints.shape[1])), tuple(range(end, end + self.joints.shape[1])))
+        behind = end + self.joints.shape[1]
+        yield Shape(JOINT, tuple(range(self.joints.shape[1])), tuple(range(end, behind)))
+        if self.scaled is not None:
+            yield Shape(SCALE, (), (behind,))
 
     def _of_targets(self) -> Iterator[Shape]:
         """Shifts of the targets that the set-up holds, three columns each, and the turn behind them."""
@@ -134,6 +143,11 @@ class Session:
             return None
         return found
 
+    @property
+    def group(self) -> str:
+        """Its name."""
+        return str(self.data.group[self.rows[0]])
+
     def row(self, visit: int) -> str:
         """The first row of a visit, in words."""
         return self.data.row_names(np.arange(len(self.data)) == self.rows[visit])
@@ -147,12 +161,16 @@ class Slip:
         notice: What it is, and what to do.
         chance: How likely chance explains as much.
         share: Part of what is left that it explains.
-        behind: Place of the first row behind it; None where a whole set-up differs from others.
+        gain: Logarithm of its evidence over that of none, less that of how much was asked for it.
+        group: Name of its set-up.
+        behind: Place of the first row behind it; None where the whole set-up differs from others.
     """
 
     notice: Notice
     chance: float
     share: float
+    gain: float
+    group: str
     behind: int | None
 
 
@@ -186,15 +204,17 @@ def _slips(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Slip]
 def slips_of(sessions: Sequence[Session]) -> list[Slip]:
     """The step of each session that has one, in words, the most evident first.
 
-    Joints are those of one arm: what one set-up shows of them, others show as well.
+    Joints and lengths are those of one arm: what one set-up shows of them, others show as well.
     """
     found = [(step, session) for session in sessions if (step := session.step()) is not None]
     told = list[Slip]()
     for step, session in sorted(found, key=lambda pair: -pair[0].gain):
         chance, kind = step.chance * len(sessions), KINDS[step.shape.what]
-        if chance < ODDS_OF_CHANCE and not (told and kind == JOINT_MOVED):
+        if chance < ODDS_OF_CHANCE and not (told and kind in OF_ONE_ARM):
             behind = int(session.rows[step.place]) if step.place else None
-            told.append(Slip(Notice(kind, _words(session, step)), chance, step.share, behind))
+            gain = step.gain - float(np.log(step.tries * len(sessions)))
+            notice = Notice(kind, _words(session, step))
+            told.append(Slip(notice, chance, step.share, gain, session.group, behind))
     return told
 
 
@@ -213,7 +233,8 @@ def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Itera
         by_readings = seen.joints[own] @ found.robot.coupling
         setup, joints = (each.reshape(count, -1) for each in (seen.setup[own], by_readings))
         points = np.ones(count, dtype=np.bool_)
-        by = Derivatives(setup, joints, points, found.arm.frame_unknowns, found.selection.targets)
+        frame, targets = found.arm.frame_unknowns, found.selection.targets
+        by = Derivatives(setup, joints, points, frame, targets, seen.scaled[own].ravel())
         yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
 
 
@@ -221,15 +242,17 @@ def _words(session: Session, step: Step) -> str:
     """What stands otherwise, from where on, by how much, and what to do."""
     where = f"Between {session.row(step.place - 1)} and {session.row(step.place)}"
     if step.place == 0:
-        where = f"In {session.data.group[session.rows[0]]}, against the other set-ups,"
+        where = f"In {session.group}, against the other set-ups,"
     if step.shape.what == TARGET:
         return f"{where} {_of_target(session.by, step)}. {OWN_GROUP}"
     far = length_mm(session.by.way_mm(step), DIGITS)
     if step.shape.what == FRAME:
         return (
-            f"{where} the measuring device, or the arm's base, turned by {_mrad(step.sizes)} (points by "
+            f"{where} the measuring device, or the arm's base, turned by {mrad(step.sizes)} (points by "
             f"{far} on average). {OWN_GROUP}"
         )
+    if step.shape.what == SCALE:
+        return f"{where} {_of_scale(step, far)}"
     what, way_out = _of_joints(session, step)
     return f"{where} {what}: points by {far} on average. {way_out}"
 
@@ -239,23 +262,28 @@ def _of_target(by: Derivatives, step: Step) -> str:
     numbers = step.shape.numbers
     shifts, turn = np.split(step.sizes, [AXES * len(numbers)])
     if not numbers:
-        return f"the target turned on the tool by {_mrad(turn)}, about itself"
+        return f"the target turned on the tool by {mrad(turn)}, about itself"
     by_mm = MM_PER_METRE * shifts.reshape(-1, AXES)
     how = f"by {' and '.join(length_mm(float(each), DIGITS) for each in np.linalg.norm(by_mm, axis=1))}"
     if len(numbers) > 1:
         return f"the targets slipped on the tool, or were put elsewhere on it, {how}"
     axes = ", ".join(f"{name} {value:+.3f}" for name, value in zip("xyz", by_mm[0], strict=True))
     what = "the target" if len(by.targets) == 1 else f"target {numbers[0] + 1}"
-    turned = f", and turned by {_mrad(turn)}" if len(turn) else ""
+    turned = f", and turned by {mrad(turn)}" if len(turn) else ""
     return (
         f"{what} slipped on the tool, or was put elsewhere on it, {how} (along the flange's axes {axes} mm)"
         f"{turned}"
     )
 
 
-def _mrad(turn: Floats) -> str:
+def mrad(turn: Floats) -> str:
     """The size of a turn (3,), rad, in words."""
-    return f"{float(f'{MRAD_PER_RAD * np.linalg.norm(turn):.{DIGITS}g}'):g} mrad"
+    return f"{_rounded(MRAD_PER_RAD * float(np.linalg.norm(turn)))} mrad"
+
+
+def _rounded(number: float) -> str:
+    """A number with its leading digits alone, in words."""
+    return f"{float(f'{number:.{DIGITS}g}'):g}"
 
 
 def _of_joints(session: Session, step: Step) -> tuple[str, str]:
@@ -263,14 +291,38 @@ def _of_joints(session: Session, step: Step) -> tuple[str, str]:
     numbers, by, joints = step.shape.numbers, session.by, session.robot.joints
     sizes = [_moved_by(joints[joint], size) for joint, size in zip(numbers, step.sizes, strict=True)]
     moved = f"joint {numbers[0] + 1} moved by {sizes[0]} against its reading"
+    why = "as where one slips or is mastered anew"
     if len(numbers) > 1:
         each = ", ".join(f"{joint + 1} by {size}" for joint, size in zip(numbers, sizes, strict=True))
         moved = f"joints moved against their readings ({each})"
+        why = "as where they are mastered anew or another load is carried (note it in a column payload_kg)"
     if numbers == (0,) and by.frame:
         return f"{moved}, or the measuring device about the same axis", OWN_GROUP
     if numbers == (len(joints) - 1,) and len(by.targets) == 1:
         return f"{moved}, or the tool about the same axis", OWN_GROUP
-    return f"{moved}, as where one slips or is mastered anew", ONE_PART
+    return f"{moved}, {why}", _one_part(session, step)
+
+
+def _of_scale(step: Step, far: str) -> str:
+    """How much longer or shorter all lengths are, of what, and what to do."""
+    size = abs(float(step.sizes[0]))
+    longer, warmer = ("longer", "warmer") if step.sizes[0] > 0.0 else ("shorter", "colder")
+    kelvin = " or ".join(f"{size / growth:.2g} K ({material})" for material, growth in PER_KELVIN.items())
+    return (
+        f"all lengths are {longer} by {_rounded(PARTS_PER_MILLION * size)} ppm: points by {far} on average "
+        "about their middle. That is an instrument of another scale (measure one known distance with each, "
+        f"and put the coordinates of that which is off right), or an arm that is {warmer} by {kelvin}: note "
+        "its temperature in a column and calibrate with --features, or from rows of one temperature alone."
+    )
+
+
+def _one_part(session: Session, step: Step) -> str:
+    """What to do with rows of which some are of an arm that stands otherwise."""
+    those = "those behind" if step.place else f"those of {session.group}"
+    return (
+        f"Rows of one arm are needed: calibrate from {those} alone, or, where these are few, from the "
+        "others, and bring that up to date with them (truearm update)."
+    )
 
 
 def _moved_by(joint: str, size: float) -> str:

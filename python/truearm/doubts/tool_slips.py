@@ -71,4 +71,5 @@ def middles(seen: Whitened, frame: int, targets: int) -> Whitened:
         joints=middle @ seen.joints,
         single=np.einsum("via,va->vi", middle, seen.single),
         setup=np.concatenate([own[:, :, :frame], alike, own[:, :, end:]], axis=2),
+        scaled=np.einsum("via,va->vi", middle, seen.scaled),
     )

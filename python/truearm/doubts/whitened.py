@@ -6,10 +6,12 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm._core import setup_jacobian
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import ConstantSpread, task_of
+from truearm.doubts.at_once import evidence
 from truearm.doubts.visited import Visits, columns_of
 from truearm.fits.core_set import core_set
 from truearm.fits.enough_values import setup_unknowns
@@ -48,6 +50,8 @@ class Whitened:
             measured.
         single: Variance (v, m) of a single shot, m^2.
         setup: Derivatives (v, m, W) by the unknowns of the own set-up, base frame; zero where not measured.
+        scaled: Derivatives (v, m) by a common scale of all lengths, about the middle of the set-up's points:
+            their places from there, m, base frame; zero where not measured.
     """
 
     rows: Rows
@@ -58,6 +62,7 @@ class Whitened:
     joints: Floats
     single: Floats
     setup: Floats
+    scaled: Floats
 
     @classmethod
     def of(
@@ -79,7 +84,7 @@ class Whitened:
         seen = Visits.of(found, fitted, progress, trusted)
         held, data = seen.held, fitted.fitted.select(seen.pose)
         size = held.shape[1]
-        inputs, arm, setup, joints = _derivatives(found, data, held, seen.targets)
+        inputs, arm, setup, joints, places = _derivatives(found, data, held, seen.targets)
         own = setup.reshape(*held.shape, len(found.groups), -1).sum(axis=2)
         of_row = found.spread.noise(arm, np.zeros(size, dtype=np.bool_)) / _scale(found)
         noise, single = seen.noise(of_row, joints)
@@ -95,7 +100,11 @@ class Whitened:
         if np.linalg.eigvalsh(taken)[-1] > 1.0 + ROUNDING:
             return None
         left = (root @ residual).reshape(held.shape)
-        return cls(seen.rows, left, seen.count[:, None] * held, root, taken, joints, single, own)
+        shots, scaled = (
+            seen.count[:, None] * held,
+            about_middle(places[:, :, None], held, data.group)[:, :, 0],
+        )
+        return cls(seen.rows, left, shots, root, taken, joints, single, own, scaled)
 
     @property
     def precision(self) -> Floats:
@@ -133,14 +142,11 @@ class Whitened:
         factor = np.linalg.cholesky(np.eye(len(left)) - (1.0 - FAINT) * self.taken)
         return float(np.square(np.linalg.solve(factor, left)).sum())
 
-    def explained(self, columns: Floats) -> tuple[float, Floats]:
+    def explained(self, columns: Floats) -> "Explained":
         """How well so many columns (v, m, k) explain what is left, in metres per unit of each.
 
         It is the score test of generalised least squares: the columns are fitted beside all that was fitted,
         without its being searched again.
-
-        Returns:
-            How likely chance explains as much, from 0 to 1; and the coefficients (k,).
         """
         from scipy.special import betaincc  # noqa: PLC0415 - slow to import
 
@@ -150,12 +156,45 @@ class Whitened:
         known, directions = np.linalg.eigh(whitened.T @ whitened - whitened.T @ self.taken @ whitened)
         directions, known = directions[:, known > FAINT], known[known > FAINT]
         score = directions.T @ (whitened.T @ self.left.ravel())
-        share = float((np.square(score) / known).sum() / self.square)
+        share = min(float((np.square(score) / known).sum() / self.square), 1.0)
         found = directions @ (score / known) / np.where(size > 0.0, size, 1.0)
         rank, free = len(known), self.freedom - len(known)
         if rank == 0 or free <= rank:
-            return 1.0, found
-        return float(betaincc(0.5 * rank, 0.5 * free, min(share, 1.0))), found
+            return Explained(1.0, -np.inf, found)
+        gain = evidence(np.array(share), np.array(rank), free, self.freedom)
+        return Explained(float(betaincc(0.5 * rank, 0.5 * free, share)), float(gain), found)
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What some columns explain of what a fit leaves.
+
+    Attributes:
+        chance: How likely chance explains as much, from 0 to 1.
+        gain: Logarithm of its evidence over that of none.
+        sizes: Coefficients of the columns (k,).
+    """
+
+    chance: float
+    gain: float
+    sizes: Floats
+
+
+def about_middle(columns: Floats, held: Mask, group: NDArray[np.str_]) -> Floats:
+    """Columns (v, m, k) of points without their mean over those of each set-up, zero where not `held` (v, m).
+
+    Whatever moves all points alike is no part of them: that frames and the drift of a set-up take up.
+    """
+    points = columns.reshape(len(columns), -1, AXES, columns.shape[-1])
+    known = held.reshape(len(held), -1, AXES)[:, :, :, None]
+    centred = np.zeros_like(points)
+    for name in np.unique(group):
+        own = group == name
+        count = np.maximum(known[own].sum(axis=(0, 1)), 1)
+        centred[own] = np.where(
+            known[own], points[own] - (points[own] * known[own]).sum(axis=(0, 1)) / count, 0.0
+        )
+    return centred.reshape(columns.shape)
 
 
 def _in_full(noise: Floats, weight: Floats, residual: Floats, known: Floats) -> tuple[Floats, Floats]:
@@ -207,9 +246,10 @@ def _beyond(found: Calibration) -> float:
 
 def _derivatives(
     found: Calibration, data: Measurements, held: Mask, targets: Rows
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Inputs (v, I) of rows, and derivatives of what they hold (v, m, ...) of some targets by the arm's
-    parameters, by the unknowns of all set-ups, and by the joint values.
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Inputs (v, I) of rows; derivatives of what they hold (v, m, ...) of some targets by the arm's
+    parameters, by the unknowns of all set-ups, and by the joint values; and the places of these (v, m), base
+    frame.
 
     They are taken where the posterior is linearised, at the constants: along what rows leave open, it is as
     wide as its prior, and derivatives from elsewhere, that turn into it ever so little, make that count.
@@ -221,7 +261,7 @@ def _derivatives(
     problem = task.problem(core_set(task.arm.robot, data, task.selection, task.groups), [])
     own = setup_jacobian(problem, parameters, setup)[:, columns_of(targets)]
     by_setup = np.zeros((*held.shape, setup_unknowns(task)))
-    by_arm = np.zeros((*held.shape, task.arm.table.size))
+    by_arm, points = np.zeros((*held.shape, task.arm.table.size)), np.zeros(held.shape)
     width = own.shape[2]
     for number, group in enumerate(task.groups):
         rows = np.flatnonzero(data.group == group)
@@ -232,8 +272,9 @@ def _derivatives(
             chain = task.arm.chain(task.arm.robot.flange @ end)
             places = np.arange(AXES * target, AXES * (target + 1))
             by_arm[np.ix_(rows, places)] = chain.parameter_jacobian(joints[rows], parameters[rows])
+            points[np.ix_(rows, places)] = chain.position(joints[rows], parameters[rows])
     by_arm, by_setup = (np.where(held[:, :, None], part, 0.0) for part in (by_arm, by_setup))
-    return inputs, by_arm, by_setup, by_arm[:, :, _joint_columns(task.arm.joints)]
+    return inputs, by_arm, by_setup, by_arm[:, :, _joint_columns(task.arm.joints)], points
 
 
 def _joint_columns(joints: Sequence[str]) -> list[int]:

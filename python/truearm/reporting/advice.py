@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.doubts.at_once import SETUP_TURNED, STEP_KINDS
 from truearm.doubts.grids import BETWEEN
-from truearm.doubts.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.doubts.moved_words import JOINTS_MOVED, LINKS_GREW, SETUP_TURNING, UNUSED_COLUMN
 from truearm.doubts.of_results import (
     CONSTANT_BETTER,
     FEW_VALUES,
@@ -242,9 +242,11 @@ def _unused_column(facts: Facts) -> Iterator[Advice]:
         yield Advice(UNUSED_COLUMN, "Calibrate with the column.", words, 2.0 * facts.mean_mm())
 
 
-def _joints_moved(facts: Facts) -> Iterator[Advice]:
-    if words := facts.noticed(JOINTS_MOVED):
-        yield Advice(JOINTS_MOVED, "Let the arm warm up.", words, facts.mean_mm())
+def _moved_meanwhile(facts: Facts) -> Iterator[Advice]:
+    for words in filter(None, map(facts.noticed, (JOINTS_MOVED, LINKS_GREW))):
+        yield Advice("joints_moved", "Let the arm warm up.", words, facts.mean_mm())
+    if words := facts.noticed(SETUP_TURNING):
+        yield Advice("setup_turning", "Let the device settle.", words, facts.mean_mm())
 
 
 def _uneven_setups(facts: Facts) -> Iterator[Advice]:
@@ -422,7 +424,7 @@ RULES: Final = (
     _outliers,
     _stood_still,
     _warm_up,
-    _joints_moved,
+    _moved_meanwhile,
     _unused_column,
     _uneven_setups,
     _on_a_grid,
