@@ -71,7 +71,11 @@ RIGHT_MM = 0.5
 # Later than the time limits of virtual devices, which the fast clock does not shorten as far.
 LATE_S = 1.5 * TIMES["timeout_s"] * SPEED
 # Share, how long the device is away, s, and the table's port: a closed TCP port is refused meanwhile.
-RESTARTS = {"restart": (SHARE, 5.0, "/dev/ttyS1"), "restart-tcp": (0.01, 20.0, "tcp://virtual:1")}
+# Few messages see one in a hundred.
+RESTARTS = {
+    "restart": (SHARE, 5.0, "/dev/ttyS1"),
+    "restart-tcp": (sized(0.03, 0.01), 20.0, "tcp://virtual:1"),
+}
 MOST_STARTS = 4
 ENDS_WITHIN_S, ONCE_ANEW = 2.0, 1
 MOVES = {
