@@ -12,6 +12,7 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "warnings.md
 CHOSEN = {
     "truearm.drifting": {"drift", "another_place"},
     "truearm.doubts.exchanged": {"rows_exchanged", "targets_exchanged"},
+    "truearm.doubts.uneven_setups": {"uneven_setups", "uneven_turns"},
     "truearm.doubts.slips": {"target_slipped", "joint_moved", "setup_turned"},
 }
 """Kinds of notices that a variable holds, by the module that makes these."""

@@ -22,7 +22,8 @@ from truearm.doubts.of_results import (
 from truearm.doubts.one_anchor import ONE_ANCHOR
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
-from truearm.doubts.uneven_setups import UNEVEN_SETUPS
+from truearm.doubts.uneven_axes import UNEVEN_AXES
+from truearm.doubts.uneven_setups import UNEVEN_SETUPS, UNEVEN_TURNS
 from truearm.errors import count_of, short_names
 from truearm.fits.details import ANOTHER_PLACE
 from truearm.fits.identifiability import BASE, SETUP
@@ -46,6 +47,12 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
+UNEVEN: Final = {
+    UNEVEN_SETUPS: "State sigma_mm.",
+    UNEVEN_TURNS: "State sigma_mrad.",
+    UNEVEN_AXES: "State sigma_x_mm, sigma_y_mm, sigma_z_mm.",
+}
+"""What rows should state whose noise differs, by the kind of notice that tells so."""
 
 
 @dataclass(frozen=True)
@@ -247,11 +254,12 @@ def _joints_moved(facts: Facts) -> Iterator[Advice]:
         yield Advice(JOINTS_MOVED, "Let the arm warm up.", words, facts.mean_mm())
 
 
-def _uneven_setups(facts: Facts) -> Iterator[Advice]:
-    if words := facts.noticed(UNEVEN_SETUPS):
-        # Outliers come first: without them there may be less to state.
-        weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
-        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, weight)
+def _uneven(facts: Facts) -> Iterator[Advice]:
+    for kind, what in UNEVEN.items():
+        if words := facts.noticed(kind):
+            # Outliers come first: without them there may be less to state.
+            weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
+            yield Advice(kind, what, words, weight)
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:
@@ -424,7 +432,7 @@ RULES: Final = (
     _warm_up,
     _joints_moved,
     _unused_column,
-    _uneven_setups,
+    _uneven,
     _on_a_grid,
     _at_few_values,
     _held_one_way,
