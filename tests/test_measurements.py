@@ -64,14 +64,18 @@ def test_sigmas_along_axes_and_of_orientations(tmp_path: Path) -> None:
     header = "q1,x_mm,y_mm,z_mm,qw,qx,qy,qz,sigma_x_mm,sigma_z_mm,sigma_y_mm,sigma_mrad"
     data = read(tmp_path, header, ["0,1,2,3,1,0,0,0,0.3,1.2,0.4,0.1", "1,1,2,3,1,0,0,0,0.1,0.1,0.1,0.2"])
     assert data.sigma_m is not None
+    assert data.sigma_axes_m is not None
+    assert data.sigma_rad is not None
     np.testing.assert_allclose(data.sigma_axes_m, [[3e-4, 4e-4, 12e-4], [1e-4] * 3], rtol=1e-15)
     np.testing.assert_allclose(data.sigma_m, [13e-4 / np.sqrt(3.0), 1e-4], rtol=1e-15)
     np.testing.assert_allclose(data.sigma_rad, [1e-4, 2e-4], rtol=1e-15)
     assert list(data.features) == []
     plain = Measurements.from_dataframe(frame(2, joints=1).assign(sigma_mm=0.1), name="plain")
     both = Measurements.concatenate([plain, data])
-    np.testing.assert_array_equal(both.select([0, 3]).sigma_axes_m, [[np.nan] * 3, [1e-4] * 3])
-    np.testing.assert_array_equal(both.select([0, 3]).sigma_rad, [np.nan, 2e-4])
+    assert both.sigma_axes_m is not None
+    np.testing.assert_array_equal(both.sigma_axes_m[[0, 3]], [[np.nan] * 3, [1e-4] * 3])
+    assert both.sigma_rad is not None
+    np.testing.assert_array_equal(both.sigma_rad[[0, 3]], [np.nan, 2e-4])
 
 
 def test_hashes_of_rows_that_state_neither_are_as_they_were() -> None:

@@ -100,7 +100,7 @@ def two_probes(arm, fine_mrad, coarse_mrad, seed=0, poses=60):
 
 
 def test_a_coarse_set_up_does_not_spoil_the_orientations_of_a_fine_one(arm):
-    errors = {"silent": [], "stated": [], "alone": []}
+    errors: dict[str, list[float]] = {"silent": [], "stated": [], "alone": []}
     for seed in range(3):
         table, mrad = two_probes(arm, 0.1, 5.0, seed)
         tables = {"silent": table, "stated": table.assign(sigma_mrad=mrad), "alone": table[:60]}
@@ -164,15 +164,18 @@ def test_the_file_of_a_calibration_keeps_what_rows_state(arm, tmp_path):
     table, mrad = two_probes(arm, 0.1, 5.0)
     calibration = found(arm, stating(table, DEPTH_MM).assign(sigma_mrad=mrad), model="constant")
     calibration.save(tmp_path / "a.calib")
-    rows = ta.Calibration.load(tmp_path / "a.calib").rows.data
-    np.testing.assert_array_equal(rows.sigma_axes_m, calibration.rows.data.sigma_axes_m)
-    np.testing.assert_array_equal(rows.sigma_rad, calibration.rows.data.sigma_rad)
-    assert rows.hash() == calibration.rows.data.hash()
+    loaded = ta.Calibration.load(tmp_path / "a.calib")
+    assert loaded.rows is not None
+    rows, before = loaded.rows.data, calibration.rows.data
+    np.testing.assert_array_equal(rows.sigma_axes_m, before.sigma_axes_m)
+    np.testing.assert_array_equal(rows.sigma_rad, before.sigma_rad)
+    assert rows.hash() == before.hash()
 
 
 def test_means_of_shots_are_as_sure_as_their_axes(arm):
     table = stating(camera(arm, 3).loc[[0, 0, 0, 0, 1, 2]].reset_index(drop=True), DEPTH_MM)
 
     means = one_row_a_pose(ta.Measurements.from_dataframe(table))
+    assert means.sigma_axes_m is not None
     np.testing.assert_allclose(means.sigma_axes_m[0], 0.5e-3 * DEPTH_MM, rtol=1e-12)
     np.testing.assert_allclose(means.sigma_axes_m[1], 1e-3 * DEPTH_MM, rtol=1e-12)

@@ -69,7 +69,7 @@ impl MeasurementSet {
             rotations: arrays
                 .rotations
                 .map_or_else(Vec::new, |array| array.as_array().iter().copied().collect()),
-            sigma: arrays.sigma.as_array().outer_iter().map(|own| sigma(own)).collect(),
+            sigma: arrays.sigma.as_array().outer_iter().map(sigma).collect(),
             weight: arrays.weight.as_array().to_vec(),
             anchor_count: anchors.max().unwrap_or(0),
             distances,

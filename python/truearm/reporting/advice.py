@@ -47,12 +47,6 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
-UNEVEN: Final = {
-    UNEVEN_SETUPS: "State sigma_mm.",
-    UNEVEN_TURNS: "State sigma_mrad.",
-    UNEVEN_AXES: "State sigma_x_mm, sigma_y_mm, sigma_z_mm.",
-}
-"""What rows should state whose noise differs, by the kind of notice that tells so."""
 
 
 @dataclass(frozen=True)
@@ -255,11 +249,15 @@ def _joints_moved(facts: Facts) -> Iterator[Advice]:
 
 
 def _uneven(facts: Facts) -> Iterator[Advice]:
-    for kind, what in UNEVEN.items():
-        if words := facts.noticed(kind):
-            # Outliers come first: without them there may be less to state.
-            weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
-            yield Advice(kind, what, words, weight)
+    # Outliers come first: without them there may be less to state.
+    weight, told = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm(), facts.noticed
+    for advice in (
+        Advice(UNEVEN_SETUPS, "State sigma_mm.", told(UNEVEN_SETUPS), weight),
+        Advice(UNEVEN_TURNS, "State sigma_mrad.", told(UNEVEN_TURNS), weight),
+        Advice(UNEVEN_AXES, "State sigma_x_mm, sigma_y_mm, sigma_z_mm.", told(UNEVEN_AXES), weight),
+    ):
+        if advice.words:
+            yield advice
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:
