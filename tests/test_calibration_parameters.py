@@ -25,7 +25,7 @@ def exact_set(robot, *, held=(), with_orientation=False, count=200):
             "group": np.zeros(count, dtype=np.int64),
             "targets": points[:, None],
             "rotations": np.ascontiguousarray(poses[:, :3, :3]) if with_orientation else None,
-            "sigma": np.zeros(count),
+            "sigma": np.zeros((count, 4)),
             "weight": np.ones(count),
             "distances": [],
         }

@@ -119,7 +119,7 @@ class SixAxes:
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": pose[:, None, :3, 3] + np.einsum("nij,tj->nti", pose[:, :3, :3], flange),
             "rotations": np.ascontiguousarray(pose[:, :3, :3]) if points is None else None,
-            "sigma": np.zeros(len(q)),
+            "sigma": np.zeros((len(q), 4)),
             "weight": np.ones(len(q)),
             "distances": [],
         }

@@ -7,6 +7,7 @@ import pytest
 from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.errors import UsageError
 from truearm.importing import ImportPlan, import_table
+from truearm.measurements import Measurements
 from truearm.units import to_si, unit_in_header
 
 
@@ -56,6 +57,22 @@ def test_a_column_is_of_a_unit_that_the_others_are_not(
     frame = import_table(path, plan(columns=columns)).frame
     name = "q1_m" if unit == "um" and ours == "q1" else ours
     assert frame[name][0] == (2.0 * found if ours == "q1" else found)
+
+
+def test_sigmas_of_axes_and_of_orientations_come_in(tmp_path: Path) -> None:
+    header = "q1,x,y,z,qw,qx,qy,qz,sigma_x_mm,Uy,Uz,sigma_mrad"
+    path = write(tmp_path, f"{header}\n0,1,2,3,1,0,0,0,0.1,0.2,0.3,4\n1,1,2,3,1,0,0,0,0.1,0.2,0.3,4\n")
+    columns = {"sigma_y": "Uy:um", "sigma_z": "Uz"}
+    asked = ImportPlan(columns=columns, joint_unit="rad", length_unit="mm")
+    data = Measurements.from_dataframe(import_table(path, asked).frame)
+    assert data.sigma_axes_m is not None
+    assert data.sigma_axes_m[0].tolist() == pytest.approx([1e-4, 2e-7, 3e-4])
+    assert data.sigma_rad is not None
+    assert data.sigma_rad.tolist() == [4e-3, 4e-3]
+    with pytest.raises(UsageError, match="Write --map sigma_rad=COLUMN:mrad"):
+        import_table(path, ImportPlan(columns={"sigma_mrad": "Uy"}, joint_unit="rad", length_unit="mm"))
+    with pytest.raises(UsageError, match='"sigma_rad" has one of the units mrad, rad, deg'):
+        import_table(path, ImportPlan(columns={"sigma_rad": "Uy:mm"}, joint_unit="rad", length_unit="mm"))
 
 
 def test_units_of_columns_are_exact() -> None:

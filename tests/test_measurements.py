@@ -60,6 +60,30 @@ def test_units_in_column_names(tmp_path: Path) -> None:
     assert data.joint_units == ("deg", "mm")
 
 
+def test_sigmas_along_axes_and_of_orientations(tmp_path: Path) -> None:
+    header = "q1,x_mm,y_mm,z_mm,qw,qx,qy,qz,sigma_x_mm,sigma_z_mm,sigma_y_mm,sigma_mrad"
+    data = read(tmp_path, header, ["0,1,2,3,1,0,0,0,0.3,1.2,0.4,0.1", "1,1,2,3,1,0,0,0,0.1,0.1,0.1,0.2"])
+    assert data.sigma_m is not None
+    assert data.sigma_axes_m is not None
+    assert data.sigma_rad is not None
+    np.testing.assert_allclose(data.sigma_axes_m, [[3e-4, 4e-4, 12e-4], [1e-4] * 3], rtol=1e-15)
+    np.testing.assert_allclose(data.sigma_m, [13e-4 / np.sqrt(3.0), 1e-4], rtol=1e-15)
+    np.testing.assert_allclose(data.sigma_rad, [1e-4, 2e-4], rtol=1e-15)
+    assert list(data.features) == []
+    plain = Measurements.from_dataframe(frame(2, joints=1).assign(sigma_mm=0.1), name="plain")
+    both = Measurements.concatenate([plain, data])
+    assert both.sigma_axes_m is not None
+    np.testing.assert_array_equal(both.sigma_axes_m[[0, 3]], [[np.nan] * 3, [1e-4] * 3])
+    assert both.sigma_rad is not None
+    np.testing.assert_array_equal(both.sigma_rad[[0, 3]], [np.nan, 2e-4])
+
+
+def test_hashes_of_rows_that_state_neither_are_as_they_were() -> None:
+    columns = {"q1": [0.1, 0.2], "x": [1.0, 2.0], "y": [1.5, 2.5], "z": [0.5, 0.25], "sigma_mm": [0.1, 0.2]}
+    found = Measurements.from_dataframe(pd.DataFrame(columns), name="a").hash()
+    assert found == "1970d11cc7d04bb9c7ceca6b810b47027be0ee827ae57ec7eec68b442efdaf10"
+
+
 def test_units_by_option(tmp_path: Path) -> None:
     data = read(
         tmp_path,
@@ -123,9 +147,9 @@ def test_groups_and_features(tmp_path: Path) -> None:
 
 
 def test_names_in_other_letters_are_noticed(tmp_path: Path) -> None:
-    data = read(tmp_path, "q1,x,y,z,Sigma mm,QW", ["0,1,2,3,4,5", "1,1,2,3,4,5"])
+    data = read(tmp_path, "q1,x,y,z,Distance mm,QW", ["0,1,2,3,4,5", "1,1,2,3,4,5"])
     assert [notice.kind for notice in data.notices] == ["column_names"]
-    assert '"Sigma mm" and "QW"' in data.notices[0].message
+    assert '"Distance mm" and "QW"' in data.notices[0].message
 
 
 def test_a_first_column_that_counts_the_rows_is_left_out_and_named(tmp_path: Path) -> None:
@@ -289,10 +313,14 @@ def test_every_part_of_the_content_counts_in_the_hash() -> None:
     table = frame()
     hashes = {Measurements.from_dataframe(table, name="a").hash()}
     changes: dict[str, Any] = {"q1": 0.5, "x": 9.0, "sigma_m": 1e-5, "temperature_C": 20.0, "group": "b"}
+    axes = {f"sigma_{axis}": 1e-5 for axis in "xyz"}
+    turned = {"qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "sigma_rad": 1e-4}
     for name, value in changes.items():
         changed = Measurements.from_dataframe(table.assign(**{name: value}), name="a")
         hashes.add(changed.hash())
-    assert len(hashes) == 6
+    for columns in (axes, turned, {**turned, "sigma_rad": 2e-4}):
+        hashes.add(Measurements.from_dataframe(table.assign(**columns), name="a").hash())
+    assert len(hashes) == 9
     assert all(len(text) == 64 for text in hashes)
 
 
@@ -439,6 +467,7 @@ def test_arrays_of_any_kind_make_the_same_measurements() -> None:
         ("targets", np.zeros((2, 1, 3)), "targets: 2 rows. There are 3 readings"),
         ("orientations", np.zeros((3, 3)), r"orientations: shape \(3, 3\). It must be \(n, 4\)"),
         ("sigma_m", 1e-4, r"sigma_m: shape \(\). It must be \(n,\)"),
+        ("sigma_axes_m", np.ones(3), r"sigma_axes_m: shape \(3,\). It must be \(n, 3\)"),
         ("group", "a", r"group: shape \(\). It must be \(n,\)"),
         ("rows", [1.0, 2.0, 3.0], "rows: values of type float64. They must be whole numbers"),
         ("features", pd.DataFrame({"n": ["x"] * 3}), 'features: column "n" of type .* Columns hold numbers'),

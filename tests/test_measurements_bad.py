@@ -92,6 +92,44 @@ TABLES = {
         '"sigma" is larger than 10 m in row 2.*sigma is in m, sigma_mm in mm',
     ),
     "sigma empty": ("q1,x,y,z,sigma_mm", ["0,1,2,3,"], "empty, zero or negative in row 1"),
+    "sigma of one axis": ("q1,x,y,z,sigma_x_mm,sigma_y_mm", ["0,1,2,3,1,1"], 'Column "sigma_z" is missing'),
+    "sigma of one axis empty": (
+        "q1,x,y,z,sigma_x,sigma_y,sigma_z",
+        ["0,1,2,3,1,1,"],
+        '"sigma_z" is empty, zero or negative in row 1',
+    ),
+    "sigmas of axes and of all": (
+        "q1,x,y,z,sigma_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm",
+        ["0,1,2,3,1,1,1,1"],
+        'columns "sigma_mm" and "sigma_x_mm" mean the same. Keep one of them',
+    ),
+    "sigmas of axes in mixed units": (
+        "q1,x,y,z,sigma_x_mm,sigma_y_m,sigma_z_mm",
+        ["0,1,2,3,1,1,1"],
+        'mixed units: column "sigma_x_mm" is in mm, "sigma_y_m" in m',
+    ),
+    "sigma that means nothing": (
+        "q1,x,y,z,sigma2_mm",
+        ["0,1,2,3,1"],
+        '"sigma2_mm" begins with "sigma" and is none that is known. Known are sigma_mm .*; sigma_x_mm, .*'
+        "sigma_mrad .*Rename it",
+    ),
+    "sigma in capitals": ("q1,x,y,z,Sigma_X", ["0,1,2,3,1"], '"Sigma_X" begins with "sigma" and is none'),
+    "sigma of orientations that are not there": (
+        "q1,x,y,z,sigma_mrad",
+        ["0,1,2,3,1"],
+        '"sigma_mrad" is of nothing that was measured. There are no orientations qw, qx, qy, qz. Remove it',
+    ),
+    "sigmas of axes of distances": (
+        "q1,distance,anchor,sigma_x,sigma_y,sigma_z",
+        ["0,1,a,1,1,1"],
+        '"sigma_x" is of nothing that was measured. There are no coordinates x, y, z. .*sigma_mm',
+    ),
+    "sigma of no orientation": (
+        "q1,x,y,z,qw,qx,qy,qz,sigma_rad",
+        ["0,1,2,3,1,0,0,0,20"],
+        '"sigma_rad" is larger than 1 rad in row 1',
+    ),
     "group empty": ("q1,x,y,z,group", ["0,1,2,3,a", "0,1,2,3,"], '"group" is empty in row 2'),
     "distance to nowhere": (
         "q1,distance,anchor",

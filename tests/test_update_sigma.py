@@ -1,5 +1,7 @@
 """What the rows of an update state as their sigma, beside the noise of the calibration."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -124,6 +126,7 @@ def test_poses_promise_no_more_than_the_device_that_was_stated_shows(arm):
 
 
 @pytest.mark.parametrize(("stating", "usual"), [(1, 0.0), (20, 0.0), (21, 5e-4), (40, 5e-4)])
-def test_a_few_rows_that_state_a_sigma_do_not_speak_for_the_others(stating, usual):
+def test_a_few_rows_that_state_a_sigma_do_not_speak_for_the_others(arm, stating, usual):
     stated = np.where(np.arange(40) < stating, 5e-4, np.nan)
-    assert KnownScale.of(np.ones((40, 3)), 15, stated, 0.0).sigma_m == usual
+    data = replace(arm.measure(arm.poses(40)), sigma_m=stated)
+    assert KnownScale.of(np.ones((40, 3)), 15, data, 0.0).sigma_m == usual

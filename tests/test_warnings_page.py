@@ -14,6 +14,7 @@ CHOSEN = {
     "truearm.doubts.exchanged": {"rows_exchanged", "targets_exchanged"},
     "truearm.doubts.slips": {"target_slipped", "joint_moved", "setup_turned", "scale_differs"},
     "truearm.doubts.moved_words": {"joints_moved", "links_grew"},
+    "truearm.doubts.uneven_setups": {"uneven_setups", "uneven_turns"},
 }
 """Kinds of notices that a variable holds, by the module that makes these."""
 PASSED_ON = ("notice.kind", "slip.notice.kind", 'content["kind"]')

@@ -207,7 +207,7 @@ class MeasuredArrays(TypedDict):
         group: Number of each pose's set-up (n,), from 0.
         targets: In world (n, T, 3).
         rotations: world_from_target (n, 3, 3), or None.
-        sigma: Of a position's components (n,).
+        sigma: Of a position's components along x, y and z of world, m, and of an orientation's, rad (n, 4).
         weight: Of each pose (n,).
         distances: In place of targets: pose, whether to an anchor, number of the anchor or other pose, m.
     """

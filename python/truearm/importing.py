@@ -25,7 +25,8 @@ from truearm.named_values import JOINT
 from truearm.tables.columns import (
     DISTANCE_COLUMN,
     QUATERNION,
-    SIGMA_COLUMN,
+    SIGMA_COLUMNS,
+    SIGMA_OF_TURN,
     TARGET_COLUMN,
     WORDS,
     MissingColumnError,
@@ -49,6 +50,8 @@ from truearm.units import (
 UNITS: Final = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
 WHICH: Final = "target"
 """Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
+TURN: Final = "sigma_rad"
+"""The sigma of an orientation, as it is written."""
 POINT: Final = ("x", "y", "z")
 MOST_TARGETS: Final = 100
 AGREE: Final = "The name of a column, a unit below it and the one that is stated for it must agree"
@@ -270,11 +273,9 @@ def _all_columns(table: RawTable, plan: ImportPlan) -> dict[str, str]:
     named = dict(plan.columns)
     found: dict[str, list[str]] = {}
     for name, part in table.parts.items():
-        bare, _, unit = part.name.rpartition("_")
-        has_unit = unit in UNITS and _is_ours(bare)
-        ours = bare if has_unit else part.name
+        ours, unit = _without_unit(part.name)
         if name not in taken and _is_ours(ours) and ours not in named:
-            found.setdefault(ours, []).append(f"{name}:{unit}" if has_unit else name)
+            found.setdefault(ours, []).append(f"{name}:{unit}" if unit else name)
     _refuse_several(table, found)
     named |= {ours: theirs[0] for ours, theirs in found.items()}
     return dict(sorted(named.items(), key=lambda item: _order(item[0])))
@@ -308,6 +309,8 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
     """
     name, unit = _split_unit(table, theirs)
     known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else COLUMN_LENGTH_UNITS
+    if ours == TURN:
+        known = COLUMN_ANGLE_UNITS
     if ours in (*WORDS, *QUATERNION, WHICH):
         known = ()
     if unit and unit not in known:
@@ -373,6 +376,8 @@ def _written(ours: str, unit: str) -> str:
 
 
 def _stated_unit(ours: str, plan: ImportPlan) -> str:
+    if ours == TURN:
+        return "rad"
     is_joint = JOINT.fullmatch(ours) is not None
     unit = plan.joint_unit if is_joint else plan.length_unit
     if unit is None:
@@ -463,20 +468,34 @@ def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
 def _check_is_ours(ours: str) -> None:
     if _is_ours(ours) or ours == WHICH:
         return
-    bare, _, unit = ours.rpartition("_")
-    known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", WHICH, *WORDS]
+    bare, unit = _without_unit(ours)
+    known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "sigma_x", TURN, "distance", WHICH, *WORDS]
     rule = did_you_mean(ours, known) or f"Known are {list_names(known)} and their like"
     way_out = "Further columns are kept with --keep"
-    if unit in UNITS and _is_ours(bare):
+    if unit:
         rule, way_out = "Units stand behind their column", f"Write --map {bare}=COLUMN:{unit}"
     raise UsageError(f'"{ours}" is no measurement column', where="--map", rule=rule, way_out=way_out)
 
 
+def _without_unit(name: str) -> tuple[str, str]:
+    """One of our names without the unit at its end, and that; any other name as it is, and "".
+
+    Sigmas of orientations are told from those of positions by their unit: they keep that in which they are
+    written.
+    """
+    turned = SIGMA_OF_TURN.fullmatch(name)
+    if turned:
+        return TURN, turned[1]
+    bare, _, unit = name.rpartition("_")
+    return (bare, unit) if unit in UNITS and _is_ours(bare) else (name, "")
+
+
 def _is_ours(name: str) -> bool:
     """Whether a name, without unit, is one of a measurement column."""
-    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET_COLUMN, SIGMA_COLUMN, DISTANCE_COLUMN))
+    patterns = (JOINT, TARGET_COLUMN, *SIGMA_COLUMNS, DISTANCE_COLUMN)
     has_unit = any(name.endswith(f"_{unit}") for unit in UNITS)
-    return name in QUATERNION + WORDS or (any(matches) and not has_unit)
+    is_plain = not has_unit and any(pattern.fullmatch(name) for pattern in patterns)
+    return is_plain or name in (*QUATERNION, *WORDS, TURN)
 
 
 def _order(ours: str) -> tuple[int, int, str]:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_numbers, as_row_numbers, check_columns, read_only
+from truearm.arrays import as_row_numbers, check_columns, read_only
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names, list_rows
 from truearm.files import as_path, name_in_text
 from truearm.kinds import count as whole_number
@@ -20,30 +20,10 @@ from truearm.kinds import required, text
 from truearm.tables.columns import StatedUnits
 from truearm.tables.measured_fields import read_fields
 from truearm.tables.reading import read_csv_table, table_from_frame
+from truearm.tables.row_fields import CONTENT, LATER, OPTIONAL, PER_ROW, as_field
 from truearm.tables.same_tables import identities, told_apart
 from truearm.types import Floats, Texts
 
-CONTENT: Final = ("readings", "targets", "orientations", "sigma_m", "group", "distance_m", "anchor", "pair")
-PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")
-NUMBERS: Final = {
-    "readings": ("N",),
-    "targets": ("T", 3),
-    "orientations": (4,),
-    "sigma_m": (),
-    "distance_m": (),
-}
-"""What each row of the fields of numbers is made of; a letter stands for any number."""
-WHOLE: Final = ("rows", "tables")
-OPTIONAL: Final = (
-    "orientations",
-    "sigma_m",
-    "distance_m",
-    "anchor",
-    "pair",
-    "purpose",
-    "default_group",
-    "tables",
-)
 GROUPS_SHOWN: Final = 3
 
 
@@ -58,7 +38,8 @@ class Measurements:
         targets: Measured points on the tool, in world (n, T, 3); NaN where a point was not measured.
         orientations: world_from_target as unit quaternions w x y z (n, 4), NaN rows where not
             measured; None where no orientation was measured at all.
-        sigma_m: Standard deviation of the position (n,), NaN where not stated; None where never.
+        sigma_m: Standard deviation of a coordinate of the position (n,), NaN where not stated; None where
+            never. Where it is stated along axes, their root mean square.
         group: Name of the set-up (n,), hence which world_from_base and which tool.
         features: All other numeric columns (n, ...), indexed from 0; a copy of the table that was given.
         sources: File of each row (n,).
@@ -75,6 +56,10 @@ class Measurements:
             nothing is called so.
         tables: Number of the table that each row was read from (n,), made of what the table held; None where
             it is not asked for, as no set-up is called after a file.
+        sigma_axes_m: Standard deviations of the position along x, y and z of world (n, 3), NaN rows where
+            they are not stated one by one; None where never.
+        sigma_rad: Standard deviation of each component of the orientation (n,), NaN where not stated; None
+            where never.
 
     Raises:
         InputError: If a field holds no such values, has another shape, or rows for other poses.
@@ -96,6 +81,8 @@ class Measurements:
     notices: tuple[Notice, ...] = ()
     default_group: Texts | None = None
     tables: NDArray[np.int64] | None = None
+    sigma_axes_m: Floats | None = None
+    sigma_rad: Floats | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -109,7 +96,7 @@ class Measurements:
         for name in PER_ROW:
             value = getattr(self, name)
             if value is not None or name not in OPTIONAL:
-                array = _as_array(name, value)
+                array = as_field(name, value)
                 object.__setattr__(self, name, read_only(array))
                 self._check_length(name, array)
         check_columns(required(self.features, pd.DataFrame, "the table of features"), where="features")
@@ -353,6 +340,8 @@ class Measurements:
         digest = hashlib.sha256()
         for name in CONTENT:
             value = getattr(self, name)
+            if value is None and name in LATER:
+                continue
             digest.update(f"{name}:{None if value is None else value.shape}:".encode())
             if value is not None:
                 is_text = value.dtype.kind == "U"
@@ -435,31 +424,9 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
         notices=tuple(notice for part in parts for notice in part.notices),
         default_group=_joined([part.default_group for part in parts], sizes, ""),
         tables=_joined([part.tables for part in parts], sizes, 0),
+        sigma_axes_m=_joined([part.sigma_axes_m for part in parts], sizes),
+        sigma_rad=_joined([part.sigma_rad for part in parts], sizes),
     )
-
-
-def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
-    """The array of a field with a row for each pose: numbers, whole numbers or names.
-
-    Raises:
-        InputError: If it is no such array, or rows have another shape.
-    """
-    array: NDArray[Any] = as_numbers(value, what=name) if name in NUMBERS else np.asarray(value)
-    row = NUMBERS.get(name, ())
-    pairs = zip(array.shape[1:], row, strict=False)
-    if np.ndim(value) != 1 + len(row) or any(want not in (have, "N", "T") for have, want in pairs):
-        raise InputError(
-            f"shape {np.shape(value)}",
-            where=name,
-            rule=f"It must be ({', '.join(str(size) for size in ('n', *row))}{'' if row else ','})",
-        )
-    if name in NUMBERS:
-        return array
-    if name not in WHOLE:
-        return array.astype(np.str_, copy=False)
-    if array.dtype.kind not in "iu":
-        raise InputError(f"values of type {array.dtype}", where=name, rule="They must be whole numbers")
-    return array.astype(np.int64, copy=False)
 
 
 def _padded_targets(parts: Sequence[Measurements]) -> Floats:

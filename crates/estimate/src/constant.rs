@@ -11,9 +11,10 @@ use truearm_kinematics::{Cancel, is_length};
 
 use crate::alike::leave_targets_open;
 use crate::dense::Cholesky;
+use crate::device_axes::turn_to_device;
 use crate::distance::Distance;
 use crate::layout::{Layout, Problem, TARGET_PRECISION};
-use crate::measurements::Noise;
+use crate::measurements::{Noise, Sigma};
 use crate::minimise::{Minimum, Objective, Reason, State};
 use crate::noise::Squares;
 use crate::packets::Packets;
@@ -248,13 +249,15 @@ impl Fit<'_> {
         let determined = |k: usize| 1.0 - precision[k] * covariance[(k, k)];
         let effective: f64 = (0..arm).map(determined).sum();
         let fixed = (Layout::new(self.problem).len() - arm) as f64;
-        let noise = self.options.noise.unwrap_or_else(|| self.noise(old, residuals, effective + fixed));
+        let mut residuals = residuals.to_vec();
+        turn_to_device(self.problem.measurements, &minimum.state.setup, &mut residuals, 1);
+        let noise = self.options.noise.unwrap_or_else(|| self.noise(old, &residuals, effective + fixed));
         let scale = match self.options.prior {
             Some(prior) if prior.scaled && arm > 0 => self.prior_scale(&prior, minimum, effective),
             _ => 1.0,
         };
         let weights = match self.options.robust {
-            Some(robust) => self.robust_weights(robust, noise, residuals),
+            Some(robust) => self.robust_weights(robust, noise, &residuals),
             None => old.weights.clone(),
         };
         Balance { noise, scale, weights, targets: old.targets }
@@ -272,7 +275,8 @@ impl Fit<'_> {
         (squares / effective.max(1.0)).sqrt().clamp(SCALE_RANGE.0, SCALE_RANGE.1)
     }
 
-    /// Noise of positions (or distances) and of orientations; the unknowns are shared out by rows.
+    /// Noise of positions (or distances) and of orientations from residuals along the axes of sigmas; the unknowns are shared
+    /// out by rows.
     ///
     /// Where there are no more values than unknowns the residuals can be made as small as one likes and tell nothing:
     /// the noise is then no less than the guess, or the covariance would promise what nobody measured.
@@ -303,21 +307,20 @@ impl Fit<'_> {
             let counts = |distance: &Distance| distance.weight(&set.weight) > 0.0;
             let measured = set.distances.iter().zip(residuals);
             for (distance, residual) in measured.filter(|(distance, _)| counts(distance)) {
-                let own = set.sigma[distance.pose].powi(2);
+                let own = set.sigma[distance.pose].of_length().powi(2);
                 position.push(residual * residual, own, distance.weight(weights));
             }
             return (position, orientation);
         }
         let rows = set.rows_per_pose();
         for pose in (0..set.pose_count()).filter(|&pose| set.weight[pose] > 0.0) {
-            let own = set.sigma[pose].powi(2);
             for row in 0..rows {
                 let square = residuals[pose * rows + row].powi(2);
-                let target = row / 3;
+                let (target, own) = (row / 3, set.own_sigma(pose, row).powi(2));
                 if target < set.target_count && set.has_target(pose, target) {
                     position.push(square, own, weights[pose]);
                 } else if target == set.target_count && set.has_rotation(pose) {
-                    orientation.push(square, 0.0, weights[pose]);
+                    orientation.push(square, own, weights[pose]);
                 }
             }
         }
@@ -341,12 +344,9 @@ impl Fit<'_> {
                     }
                 })
                 .map(|row| {
-                    let sigma = if row / 3 < set.target_count {
-                        noise.position.hypot(set.sigma[pose])
-                    } else {
-                        noise.orientation
-                    };
-                    residuals[pose * rows + row] / sigma
+                    let of_position = row / 3 < set.target_count;
+                    let noise = if of_position { noise.position } else { noise.orientation };
+                    residuals[pose * rows + row] / noise.hypot(set.own_sigma(pose, row))
                 })
                 .collect();
             let mean = standardised.iter().map(|z| z * z).sum::<f64>() / standardised.len().max(1) as f64;
@@ -360,7 +360,7 @@ impl Fit<'_> {
         let set = self.problem.measurements;
         let mut squares = vec![(0.0, 0.0_f64); set.pose_count()];
         for (distance, residual) in set.distances.iter().zip(residuals) {
-            let sigma = noise.position.hypot(set.sigma[distance.pose]);
+            let sigma = noise.position.hypot(set.sigma[distance.pose].of_length());
             let (sum, count) = &mut squares[distance.pose];
             *sum += (residual / sigma).powi(2);
             *count += 1.0;
@@ -385,7 +385,7 @@ impl Fit<'_> {
         self.options.prior.is_none()
             && balance.targets == 0.0
             && !set.has_rotations()
-            && set.sigma.iter().all(|&sigma| sigma == 0.0)
+            && set.sigma.iter().all(|&sigma| sigma == Sigma::default())
             && self.options.robust.is_none_or(|robust| robust == Robust::None)
     }
 }

@@ -145,7 +145,7 @@ pub fn normal_equations(
     let mut normal = Normal::zeros(Layout::new(problem).len());
     for (row, distance) in rows(problem, point)?.into_iter().zip(&set.distances) {
         let weight = weighting.map_or(1.0, |(noise, weight)| {
-            row_weight(noise.position, set.sigma[distance.pose], distance.weight(weight)).sqrt()
+            row_weight(noise.position, set.sigma[distance.pose].of_length(), distance.weight(weight)).sqrt()
         });
         let entries: Vec<_> = row.entries.iter().map(|&(at, value)| (at, weight * value)).collect();
         normal.add_row(&entries, weight * row.residual);

@@ -3,7 +3,8 @@
 //! The measurement model is that of one group (set-up):
 //! `measured target = world_from_base . base . A1 ... AN . flange . target`, with the links' parameters
 //! nominal + CEP, and `world_from_base` and the target points unknown in every group. All residuals and
-//! Jacobians are taken in the robot's base frame, where isotropic noise stays isotropic.
+//! Jacobians are taken in the robot's base frame, where isotropic noise stays isotropic; those of a device that is less sure
+//! along one of its axes are turned to these where they are weighted.
 //!
 //! Order of unknowns everywhere: active link parameters (links in order, within a link theta, d, a, alpha,
 //! beta), then group by group: translation (3) and rotation (3) of `world_from_base`, target points
@@ -15,6 +16,7 @@ mod alike;
 mod choice;
 mod constant;
 pub mod dense;
+mod device_axes;
 mod distance;
 mod error;
 mod identifiability;
@@ -45,11 +47,12 @@ pub use choice::{
     Choice, ChoiceOptions, Criterion, Observability, choose_poses, observability, observability_of,
 };
 pub use constant::{ConstantFit, ConstantOptions, Prior, fit_constant};
+pub use device_axes::{own_covariance, turn_to_device};
 pub use distance::{Distance, DistanceTo};
 pub use error::EstimateError;
 pub use identifiability::{Confounded, Identifiability, identifiability, independent_columns};
 pub use layout::{Layout, Problem};
-pub use measurements::{MeasurementSet, Noise};
+pub use measurements::{MeasurementSet, Noise, Sigma};
 pub use minimise::Reason;
 pub use non_negative::non_negative_least_squares;
 pub use robust::Robust;

@@ -14,6 +14,40 @@ pub struct Noise {
     pub orientation: f64,
 }
 
+/// What a row states of its own standard deviations; zero where it states none.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Sigma {
+    /// Of a position's components along x, y and z of world, m.
+    pub position: [f64; 3],
+    /// Of each rotation-vector component, rad.
+    pub orientation: f64,
+}
+
+impl Sigma {
+    /// That of a device which is as sure of each component of a position, and of orientations as of nothing else.
+    pub fn of_position(sigma: f64) -> Self {
+        Self { position: [sigma; 3], orientation: 0.0 }
+    }
+
+    /// Along x, y and z, m, and of orientation, rad.
+    pub fn values(&self) -> [f64; 4] {
+        let [x, y, z] = self.position;
+        [x, y, z, self.orientation]
+    }
+
+    /// Whether a position is less sure along one axis than along another.
+    pub fn differs_by_axis(&self) -> bool {
+        let [x, y, z] = self.position;
+        x != y || y != z
+    }
+
+    /// Of a length in any direction: the root mean square of the axes, m.
+    pub fn of_length(&self) -> f64 {
+        let [x, y, z] = self.position;
+        if self.differs_by_axis() { ((x * x + y * y + z * z) / 3.0).sqrt() } else { x }
+    }
+}
+
 /// Measurements of `n` poses in one or more groups (set-ups).
 #[derive(Debug, Clone, Default)]
 pub struct MeasurementSet {
@@ -31,8 +65,8 @@ pub struct MeasurementSet {
     pub targets: Vec<f64>,
     /// Measured world_from_target rotations, (n, 9) row-major, or empty; NaN where not measured.
     pub rotations: Vec<f64>,
-    /// The rows' own standard deviation of each position component, (n,), m.
-    pub sigma: Vec<f64>,
+    /// What each row states of its own standard deviations, (n,).
+    pub sigma: Vec<Sigma>,
     /// Weight of each pose in the fit, (n,), between 0 and 1.
     pub weight: Vec<f64>,
     /// Distances measured instead of points; poses then hold no targets.
@@ -79,6 +113,17 @@ impl MeasurementSet {
         3 * (targets + usize::from(self.has_rotation(pose)))
     }
 
+    /// Whether some row states a position to be less sure along one axis of world than along another.
+    pub fn differs_by_axis(&self) -> bool {
+        self.sigma.iter().any(Sigma::differs_by_axis)
+    }
+
+    /// What a pose states as the standard deviation of one of its rows, a position's along an axis of world.
+    pub fn own_sigma(&self, pose: usize, row: usize) -> f64 {
+        let own = &self.sigma[pose];
+        if row / 3 < self.target_count { own.position[row % 3] } else { own.orientation }
+    }
+
     /// Whether `target` was measured at `pose`.
     pub fn has_target(&self, pose: usize, target: usize) -> bool {
         !self.targets[3 * (pose * self.target_count + target)].is_nan()
@@ -100,7 +145,7 @@ impl MeasurementSet {
             group: poses.iter().map(|&pose| self.group[pose]).collect(),
             targets: take(&self.targets, 3 * self.target_count),
             rotations,
-            sigma: take(&self.sigma, 1),
+            sigma: poses.iter().map(|&pose| self.sigma[pose]).collect(),
             weight: take(&self.weight, 1),
             distances: Vec::new(),
             anchor_count: 0,
@@ -131,7 +176,7 @@ impl MeasurementSet {
         finite("joint value", &self.joints, self.joint_count)?;
         whole_or_missing("target", &self.targets, 3, self.target_count)?;
         whole_or_missing("rotation", &self.rotations, 9, 1)?;
-        finite("sigma", &self.sigma, 1)?;
+        finite("sigma", &self.sigma.iter().flat_map(Sigma::values).collect::<Vec<f64>>(), 4)?;
         finite("weight", &self.weight, 1)?;
         for rotation in self.rotations.as_chunks::<9>().0.iter().filter(|values| values[0].is_finite()) {
             Transform { rotation: *rotation, translation: [0.0; 3] }.check("measured rotation")?;
@@ -142,11 +187,11 @@ impl MeasurementSet {
 
     fn check_ranges(&self) -> Result<(), EstimateError> {
         let refuse = |what, value, rule| Err(EstimateError::Option { what, value, rule });
-        if let Some(&sigma) = self.sigma.iter().find(|&&sigma| sigma < 0.0) {
+        if let Some(sigma) = self.sigma.iter().flat_map(Sigma::values).find(|&sigma| sigma < 0.0) {
             return refuse(
                 "a pose's sigma",
                 sigma,
-                "a standard deviation is zero or more: give it in metres",
+                "a standard deviation is zero or more: give it in metres and radians",
             );
         }
         if let Some(&weight) = self.weight.iter().find(|weight| !(0.0..=1.0).contains(*weight)) {

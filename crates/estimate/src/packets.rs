@@ -22,7 +22,8 @@ pub struct Packet<'a> {
     pub rotation: &'a [Lane],
     /// One where the target (then: the orientation) was measured, else zero, (T + 1,).
     pub present: &'a [Lane],
-    pub sigma: Lane,
+    /// Of what is measured along x, y and z of world, m, and of orientation, rad, (4,).
+    pub sigma: &'a [Lane],
 }
 
 /// Consecutive packets of one group.
@@ -53,7 +54,7 @@ impl Packets {
             targets: Vec::with_capacity(count * 3 * set.target_count),
             rotations: Vec::with_capacity(if set.has_rotations() { 9 * count } else { 0 }),
             present: Vec::with_capacity(count * (set.target_count + 1)),
-            sigma: Vec::with_capacity(count),
+            sigma: Vec::with_capacity(4 * count),
         };
         for group in 0..set.group_count {
             let poses: Vec<usize> = (0..set.pose_count()).filter(|&pose| set.group[pose] == group).collect();
@@ -90,7 +91,7 @@ impl Packets {
             targets: &self.targets[part(&self.targets)],
             rotation: &self.rotations[part(&self.rotations)],
             present: &self.present[part(&self.present)],
-            sigma: self.sigma[index],
+            sigma: &self.sigma[part(&self.sigma)],
         }
     }
 
@@ -100,7 +101,8 @@ impl Packets {
         let count = eight.len();
         self.poses.push((poses, count));
         gather(&mut self.joints, &set.joints, set.joint_count, &poses);
-        self.sigma.push(Lane::from_fn(|lane| set.sigma[poses[lane]]));
+        let sigmas = poses.map(|pose| set.sigma[pose].values());
+        self.sigma.extend((0..4).map(|k| Lane::from_fn(|lane| sigmas[lane][k])));
         let width = 3 * set.target_count;
         let first = self.targets.len();
         gather(&mut self.targets, &set.targets, width, &poses);

@@ -44,7 +44,8 @@ impl Point<'_> {
 
 /// Square roots of the weights of one packet's rows.
 struct Weights {
-    position: Lane,
+    /// Along x, y and z: of the device where sigmas differ along these, else of the base, and all alike.
+    position: [Lane; 3],
     orientation: Lane,
 }
 
@@ -61,6 +62,8 @@ pub struct RowBuilder<'a> {
     problem: &'a Problem<'a>,
     weighting: Weighting<'a>,
     shared: Option<SharedParameters>,
+    /// Whether rows of positions are weighted along the axes of the device.
+    by_device: bool,
 }
 
 /// Noise and weight of each pose (n,); `None` leaves the rows unweighted.
@@ -71,7 +74,8 @@ impl<'a> RowBuilder<'a> {
     pub fn new(problem: &'a Problem<'a>, point: Point<'a>, weighting: Weighting<'a>) -> Self {
         let one = point.parameters.len() == problem.chain.parameter_count();
         let shared = one.then(|| SharedParameters::new(point.parameters));
-        Self { layout: Layout::new(problem), point, problem, weighting, shared }
+        let by_device = weighting.is_some() && problem.measurements.differs_by_axis();
+        Self { layout: Layout::new(problem), point, problem, weighting, shared, by_device }
     }
 
     /// Columns of a packet: arm, the group's unknowns, the residual.
@@ -87,17 +91,19 @@ impl<'a> RowBuilder<'a> {
     #[inline(always)]
     fn weights(&self, packet: &Packet) -> Weights {
         let Some((noise, weight)) = self.weighting else {
-            return Weights { position: Lane::splat(1.0), orientation: Lane::splat(1.0) };
+            return Weights { position: [Lane::splat(1.0); 3], orientation: Lane::splat(1.0) };
         };
-        let of = |noise: f64, sigma: &dyn Fn(usize) -> f64| {
+        let of = |noise: f64, sigma: &Lane| {
             Lane(std::array::from_fn(|lane| {
-                row_weight(noise, sigma(lane), weight[packet.poses[lane]]).sqrt()
+                row_weight(noise, sigma.0[lane], weight[packet.poses[lane]]).sqrt()
             }))
         };
-        Weights {
-            position: of(noise.position, &|lane| packet.sigma.0[lane]),
-            orientation: of(noise.orientation, &|_| 0.0),
-        }
+        let position = if self.by_device {
+            std::array::from_fn(|k| of(noise.position, &packet.sigma[k]))
+        } else {
+            [of(noise.position, &packet.sigma[0]); 3]
+        };
+        Weights { position, orientation: of(noise.orientation, &packet.sigma[3]) }
     }
 
     /// Scratch for [`RowBuilder::fill`].
@@ -139,8 +145,12 @@ impl<'a> RowBuilder<'a> {
         self.sweep::<I>(packet, sweep);
         let weights = self.weights(packet);
         for target in 0..self.problem.measurements.target_count {
-            let weight = packet.present[target] * weights.position;
-            self.target_rows::<I>(packet, group, sweep, (target, weight), columns, row + 3 * target);
+            let (present, place) = (packet.present[target], row + 3 * target);
+            let weight = if self.by_device { present } else { present * weights.position[0] };
+            self.target_rows::<I>(packet, group, sweep, (target, weight), columns, place);
+            if self.by_device {
+                self.weigh_by_device::<I>(group, &weights.position, columns, place);
+            }
         }
         if self.layout.rotation == 3 {
             let weight = packet.present[self.problem.measurements.target_count] * weights.orientation;
@@ -193,6 +203,25 @@ impl<'a> RowBuilder<'a> {
         let measured = into_base::<I>(&group.world_from_base, &packet.targets[3 * target..3 * target + 3]);
         for k in 0..3 {
             columns.set(column, row + k, weight * (measured[k] - point[k]));
+        }
+    }
+
+    /// Turns a target's three rows from `row` on to the axes of the device, and weighs them along these.
+    #[inline(always)]
+    fn weigh_by_device<I: Isa>(
+        &self,
+        group: &GroupSetup,
+        weights: &[Lane; 3],
+        columns: &mut Columns,
+        row: usize,
+    ) {
+        let world_from_base = Lane::splat_all(&group.world_from_base.rotation);
+        for column in 0..self.width() {
+            let in_base = std::array::from_fn(|k| columns.get(column, row + k));
+            let in_world = rotate::<I>(&world_from_base, &in_base);
+            for k in 0..3 {
+                columns.set(column, row + k, weights[k] * in_world[k]);
+            }
         }
     }
 

@@ -184,10 +184,10 @@ impl Shots<'_> {
         doubted
     }
 
-    /// Variance that a shot's positions or orientations state, with that of an instrument's last digit.
+    /// Variance that a shot's positions or orientations state at the most, with that of an instrument's last digit.
     fn stated(&self, shot: usize, kind: usize) -> f64 {
-        let row = self.training.rows(shot).find(|&row| self.kind(row) == kind);
-        row.map_or(0.0, |row| self.training.variance[row]) + LAST_DIGIT * LAST_DIGIT
+        let rows = self.training.rows(shot).filter(|&row| self.kind(row) == kind);
+        rows.map(|row| self.training.variance[row]).fold(0.0, f64::max) + LAST_DIGIT * LAST_DIGIT
     }
 
     /// Squares of each shot's deviations from its pose's median, over what it states, of positions and of orientations.
@@ -211,8 +211,8 @@ impl Shots<'_> {
     fn squares_left(&self) -> [Vec<Mean>; 2] {
         let mut squares = [0, 1].map(|_| vec![Mean::default(); self.training.pose_count()]);
         for (row, left) in self.left.iter().enumerate() {
-            let (shot, kind) = (self.shot(row), self.kind(row));
-            squares[kind][shot].add(left * left / self.stated(shot, kind));
+            let stated = self.training.variance[row] + LAST_DIGIT * LAST_DIGIT;
+            squares[self.kind(row)][self.shot(row)].add(left * left / stated);
         }
         squares
     }

@@ -1,7 +1,7 @@
 //! From measurements to rows that a field is inferred from.
 
 use truearm_bank::{Input, Levers, range};
-use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_precision};
+use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_precision, turn_to_device};
 
 use crate::FieldError;
 use crate::options::FieldOptions;
@@ -15,7 +15,10 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
     let set = problem.measurements;
     let layout = Layout::new(problem);
     let nominal = problem.chain.nominal();
-    let linear = linearise(problem, point)?;
+    let mut linear = linearise(problem, point)?;
+    let widths = [layout.arm, layout.group_width(), 1];
+    let parts = [&mut linear.arm, &mut linear.setup, &mut linear.residual];
+    parts.into_iter().zip(widths).for_each(|(part, width)| turn_to_device(set, point.setup, part, width));
     let columns = columns(problem, options);
     let inputs: Vec<Input> =
         joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
@@ -78,7 +81,7 @@ fn push_row(
     setup[start..start + width].copy_from_slice(&linear.setup[at * width..(at + 1) * width]);
     training.setup.extend(setup);
     training.residual.push(linear.residual[at] + known);
-    training.variance.push(if orientation { 0.0 } else { set.sigma[pose].powi(2) });
+    training.variance.push(set.own_sigma(pose, row).powi(2));
     training.weight.push(set.weight[pose]);
     training.source.push(vec![Shot { place: at, share: 1.0 }]);
     training.is_orientation.push(orientation);

@@ -1,6 +1,6 @@
 //! What a measurement that took no part should show: predicted covariance of its residual.
 
-use truearm_estimate::{Layout, Point, Problem, linearise};
+use truearm_estimate::{Layout, Point, Problem, linearise, own_covariance};
 
 use crate::FieldError;
 use crate::posterior::Posterior;
@@ -45,11 +45,16 @@ pub fn measurement_covariance(
     covariance.iter_mut().zip(&anew).for_each(|(sum, term)| *sum += term);
     let noise = posterior.model().hyper.noise;
     for pose in 0..set.pose_count() {
+        let own = own_covariance(set, point.setup, pose);
         for row in 0..rows {
-            let orientation = row / 3 >= set.target_count;
-            let own = if orientation { 0.0 } else { set.sigma[pose] };
-            covariance[(pose * rows + row) * rows + row] +=
-                noise[usize::from(orientation)].powi(2) + own * own;
+            let place = (pose * rows + row) * rows;
+            if row / 3 >= set.target_count {
+                covariance[place + row] += noise[1].powi(2) + set.sigma[pose].orientation.powi(2);
+                continue;
+            }
+            covariance[place + row] += noise[0].powi(2);
+            let first = row - row % 3;
+            (0..3).for_each(|k| covariance[place + first + k] += own[row % 3][k]);
         }
     }
     Ok(covariance)

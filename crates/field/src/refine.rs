@@ -1,7 +1,7 @@
 //! From the linear solution to the exact model's.
 
 use truearm_bank::Bank;
-use truearm_estimate::{Layout, Point, Problem, Setup, residuals};
+use truearm_estimate::{Layout, Point, Problem, Setup, residuals, turn_to_device};
 
 use crate::FieldError;
 use crate::posterior::{Posterior, Solution};
@@ -34,9 +34,10 @@ pub fn relinearised(
     let mut refined = apply(problem, point, posterior, values, &solution)?;
     for _ in 0..RELINEARISATIONS {
         let explained = explained(posterior.training(), &solution)?;
-        let left = |shots: &Vec<Shot>| {
-            shots.iter().map(|shot| shot.share * refined.residuals[shot.place]).sum::<f64>()
-        };
+        let mut residuals = refined.residuals.clone();
+        turn_to_device(problem.measurements, point.setup, &mut residuals, 1);
+        let left =
+            |shots: &Vec<Shot>| shots.iter().map(|shot| shot.share * residuals[shot.place]).sum::<f64>();
         let source = posterior.training().source.iter();
         let linear: Vec<f64> = source.zip(&explained).map(|(shots, part)| left(shots) + part).collect();
         solution = posterior.solve(&linear)?;

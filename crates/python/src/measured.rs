@@ -1,12 +1,12 @@
 //! `_core.MeasurementSet` and `_core.Setup`: what was measured, and the unknowns of the measurement.
 
-use numpy::ndarray::{Array1, Array2, Array3};
+use numpy::ndarray::{Array1, Array2, Array3, ArrayView1};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use truearm_estimate::{Distance, DistanceTo, GroupSetup, MeasurementSet as Core, Setup as CoreSetup};
+use truearm_estimate::{Distance, DistanceTo, GroupSetup, MeasurementSet as Core, Setup as CoreSetup, Sigma};
 use truearm_kinematics::Transform;
 
 use crate::door::{CoreError, Failure};
@@ -31,7 +31,7 @@ struct Arrays<'py> {
     group: PyReadonlyArray1<'py, i64>,
     targets: PyReadonlyArray3<'py, f64>,
     rotations: Option<PyReadonlyArray3<'py, f64>>,
-    sigma: PyReadonlyArray1<'py, f64>,
+    sigma: PyReadonlyArray2<'py, f64>,
     weight: PyReadonlyArray1<'py, f64>,
     distances: Vec<(usize, bool, usize, f64)>,
 }
@@ -40,6 +40,11 @@ struct Arrays<'py> {
 impl MeasurementSet {
     #[new]
     fn new(arrays: Arrays<'_>) -> PyResult<Self> {
+        if arrays.sigma.shape()[1] != 4 {
+            return Err(CoreError::new_err("sigma needs four columns: x, y, z and orientation"));
+        }
+        let sigma =
+            |own: ArrayView1<'_, f64>| Sigma { position: [own[0], own[1], own[2]], orientation: own[3] };
         let distance = |&(pose, to_anchor, index, value): &(usize, bool, usize, f64)| Distance {
             pose,
             to: if to_anchor { DistanceTo::Anchor(index) } else { DistanceTo::Pose(index) },
@@ -64,7 +69,7 @@ impl MeasurementSet {
             rotations: arrays
                 .rotations
                 .map_or_else(Vec::new, |array| array.as_array().iter().copied().collect()),
-            sigma: arrays.sigma.as_array().to_vec(),
+            sigma: arrays.sigma.as_array().outer_iter().map(sigma).collect(),
             weight: arrays.weight.as_array().to_vec(),
             anchor_count: anchors.max().unwrap_or(0),
             distances,

@@ -119,5 +119,5 @@ def constant_details(task: Task, fits: Fits) -> ConstantDetails:
     names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
     common = _share(task, fits)
     rank, widened = fits.identifiability.total_rank, _widened(task, fits)
-    scale = KnownScale.of(fit.residuals, rank, fits.data.sigma_m, common, widened)
+    scale = KnownScale.of(fit.residuals, rank, fits.data, common, widened)
     return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)

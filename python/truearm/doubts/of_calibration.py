@@ -33,7 +33,8 @@ from truearm.doubts.slips import Slip, main_slips, slips
 from truearm.doubts.tool_slips import tool_slips
 from truearm.doubts.turned_later import turned_in_setups, turned_later
 from truearm.doubts.unbent import may_be_bent, unbent
-from truearm.doubts.uneven_setups import uneven_setups
+from truearm.doubts.uneven_axes import uneven_axes
+from truearm.doubts.uneven_setups import uneven_setups, uneven_turns
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
 from truearm.fits.details import VariableDetails, left_m
@@ -138,7 +139,12 @@ def _of_left(task: Task, found: Calibration, progress: Floats, robust: Fits | No
     if seen is None:
         return [*bent, *(slip.notice for slip in _slips_by_constants(task, found, rows, progress))]
     slipped = slips(found, rows, seen, progress) or _slips_by_constants(task, found, rows, progress)
-    return [*bent, *uneven_setups(found, rows, seen), *moved_joints(found, rows, seen, progress, slipped)]
+    uneven = [
+        *uneven_setups(found, rows, seen),
+        *uneven_turns(found, rows),
+        *uneven_axes(found, rows, seen),
+    ]
+    return [*bent, *uneven, *moved_joints(found, rows, seen, progress, slipped)]
 
 
 def _reason(task: Task, found: Calibration, progress: Floats) -> list[Notice]:

@@ -65,8 +65,8 @@ def _words(data: Measurements) -> list[list[str]]:
     if data.purpose is not None:
         given.append(data.purpose)
     columns = [words.tolist() for words in given]
-    if data.sigma_m is not None:
-        columns.append([repr(sigma) for sigma in data.sigma_m.tolist()])
+    stated = [sigma for sigma in (data.sigma_m, data.sigma_axes_m, data.sigma_rad) if sigma is not None]
+    columns.extend([repr(sigma) for sigma in sigmas.tolist()] for sigmas in stated)
     return columns
 
 

@@ -1,66 +1,34 @@
 """Set-ups whose rows scatter differently, as of two instruments, where no sigma tells the fit so."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from truearm.calibration import Calibration
+from truearm.doubts.scattering import (
+    ERROR_OF_MEDIAN,
+    LEAST_KEPT,
+    LITTLE,
+    MRAD,
+    Scattering,
+    deviation_of,
+    leaves,
+    or_else,
+    single_shot,
+)
 from truearm.doubts.whitened import Whitened
 from truearm.errors import Notice
 from truearm.fits.fitted_rows import FittedRows
-from truearm.lengths import length_mm
+from truearm.rows.own_sigmas import sigmas_of_turns
+from truearm.rows.visits import pose_count
 from truearm.types import AXES, Mask
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 UNEVEN_SETUPS: Final = "uneven_setups"
-WORSE: Final = 2.0
-"""Times that a set-up scatters as much as another from which their noises have to be told apart."""
-SURE: Final = 4.0
-"""Standard errors of the logarithm of that ratio by which it is more than chance."""
-QUARTILE: Final = 0.6745
-"""Half of normal values are within so many standard deviations."""
-ERROR_OF_MEDIAN: Final = 1.1664
-"""Relative standard error of the median of absolute values, times the root of their number."""
-LEAST_KEPT: Final = 0.05
-"""Part of a coordinate's variance that is left of it at the least: what a fit follows tells nothing."""
-MOSTLY: Final = 0.5
-"""A set-up states its noise whose sigma is so large a part of its scatter."""
-
-LITTLE_MM: Final = 0.001
-"""A sigma for rows whose noise is that which all have: every row of the column needs one."""
-
-
-@dataclass(frozen=True)
-class Scattering:
-    """How the rows of a set-up scatter about a model.
-
-    Attributes:
-        name: Name of the set-up.
-        deviation: Standard deviation of a coordinate, over what the fit took for it.
-        mm: The same of a single shot, in mm.
-        error: Relative standard error of both.
-        stated_mm: What half of the rows state as their sigma, or less.
-    """
-
-    name: str
-    deviation: float
-    mm: float
-    error: float
-    stated_mm: float
-
-    def is_worse(self, than: "Scattering") -> bool:
-        """Whether it surely scatters more than another, in mm and over what the fit knew."""
-        ratio = min(self.deviation / than.deviation, self.mm / than.mm)
-        return ratio > max(WORSE, float(np.exp(SURE * np.hypot(self.error, than.error))))
-
-    def times(self, than: "Scattering") -> str:
-        """How much more than another, in words."""
-        return f"{self.name} {self.mm / than.mm:.2g} times as much as {than.name}"
-
-    def beside(self, other: "Scattering") -> str:
-        """What its rows should state beside the scatter that another has as well, in words."""
-        return f"about {length_mm(float(np.sqrt(self.mm**2 - other.mm**2)), 2)} in the rows of {self.name}"
+UNEVEN_TURNS: Final = "uneven_turns"
+OWN_TURNS: Final = 2
+"""Orientations that what a set-up finds of its own takes up: how it and its target are turned."""
 
 
 def uneven_setups(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Notice]:
@@ -73,41 +41,63 @@ def uneven_setups(found: Calibration, fitted: FittedRows, seen: Whitened) -> lis
     """
     names = fitted.data.group[seen.rows]
     every = [_scattering(fitted, seen, name, names == name) for name in found.groups if name in names]
+    return _told(found, every, UNEVEN_SETUPS, "set-ups that scatter differently", "sigma_mm")
+
+
+def uneven_turns(found: Calibration, fitted: FittedRows) -> list[Notice]:
+    """The same of orientations."""
+    if not found.selection.orientation:
+        return []
+    every = [_turning(fitted, found.constant.noise_rad, name) for name in found.groups]
+    known = [each for each in every if each is not None]
+    what = "orientations of set-ups that scatter differently"
+    return _told(found, known, UNEVEN_TURNS, what, "sigma_mrad")
+
+
+def _told(found: Calibration, every: Sequence[Scattering], kind: str, what: str, column: str) -> list[Notice]:
     if len(every) < 2:
         return []
-    best = min(every, key=lambda each: each.mm)
-    worse = [each for each in every if each.is_worse(best) and each.stated_mm < MOSTLY * each.mm]
+    best = min(every, key=lambda each: each.size)
+    worse = [each for each in every if each.is_worse(best) and not each.says_so]
     if not worse:
         return []
-    what = "Constants leave" if found.variable is None else "The model leaves"
-    or_else = (
-        " What constants leave may be the arm's, too: --model variable tells them apart."
-        if found.variable is None
-        else ""
-    )
     text = (
-        f"{what} set-ups that scatter differently, as those of different instruments do: "
+        f"{leaves(found)} {what}, as those of different instruments do: "
         f"{'; '.join(each.times(best) for each in worse)}. Where rows do not state how far they may be off "
-        "all count the same, and the good ones are spoilt. Give a column sigma_mm: "
-        f"{', '.join(each.beside(best) for each in worse)}, in the others what their instrument's data sheet "
-        f"says, or little ({LITTLE_MM:g} mm), since what all rows have in common is found beside it."
-        f"{or_else}"
+        f"all count the same, and the good ones are spoilt. Give a column {column}: "
+        f"{', '.join(f'{each.beyond(best)} in the rows of {each.name}' for each in worse)}, in the others "
+        f"what their instrument's data sheet says, or little ({LITTLE:g} {best.unit}), since what all rows "
+        f"have in common is found beside it.{or_else(found)}"
     )
-    return [Notice(UNEVEN_SETUPS, text)]
+    return [Notice(kind, text)]
 
 
 def _scattering(fitted: FittedRows, seen: Whitened, name: str, own: Mask) -> Scattering:
-    """That of the visits (v,) of a set-up, by medians: single rows may be far off."""
+    """That of the visits (v,) of a set-up."""
     held = seen.held[own]
     kept = np.maximum(seen.kept[own][held], LEAST_KEPT)
-    deviation = float(np.median(np.abs(seen.left[own][held]) / np.sqrt(kept))) / QUARTILE
+    deviation = deviation_of(seen.left[own][held] / np.sqrt(kept))
     of_visit, shots, single = (
         float(np.median(each[own][held])) for each in (seen.variance, seen.shots, seen.single)
     )
-    # What the mean of its shots scatters beyond what was expected, each of them has of its own.
-    square = max(single + shots * (deviation**2 - 1.0) * of_visit, deviation**2 * of_visit)
     error = ERROR_OF_MEDIAN / np.sqrt(AXES * len(held))
     data = fitted.data.select(seen.rows[own])
     stated = float(np.median(data.stated_sigma_m))
-    mm = MM_PER_METRE * float(np.sqrt(square))
-    return Scattering(name, deviation, mm, float(error), MM_PER_METRE * stated)
+    size = single_shot(deviation, of_visit, shots, single)
+    return Scattering(name, deviation, MM_PER_METRE * size, float(error), MM_PER_METRE * stated)
+
+
+def _turning(fitted: FittedRows, noise_rad: float, name: str) -> Scattering | None:
+    """That of the orientations of a set-up beside a noise; None where it tells of too few poses."""
+    rows = fitted.data.oriented & (fitted.data.group == name)
+    poses = pose_count(fitted.data.select(rows)) if rows.any() else 0
+    if poses <= OWN_TURNS:
+        return None
+    stated = sigmas_of_turns(fitted.data)[rows]
+    expected = np.sqrt(max(1.0 - OWN_TURNS / poses, LEAST_KEPT)) * np.hypot(noise_rad, stated)
+    left = fitted.residual[rows, -AXES:]
+    deviation = deviation_of(left / expected[:, None])
+    size = deviation_of(left) * float(np.median(np.hypot(noise_rad, stated) / expected))
+    error = float(ERROR_OF_MEDIAN / np.sqrt(AXES * poses))
+    usual = MRAD_PER_RAD * float(np.median(stated))
+    return Scattering(name, deviation, MRAD_PER_RAD * size, error, usual, MRAD)

@@ -11,6 +11,7 @@ from truearm.doubts.row_order import FEWEST_VISITS
 from truearm.fits.fitted_rows import FittedRows
 from truearm.fits.measured_parts import held_parts
 from truearm.rows.evenly import some_rows
+from truearm.rows.own_sigmas import of_all_targets, own_covariances
 from truearm.rows.shots import Scatter
 from truearm.rows.visits import fitted_poses, means, pose_numbers, visits_of
 from truearm.types import AXES, Floats, Mask, Rows
@@ -41,7 +42,7 @@ class Visits:
         count: How many shots it has (v,).
         of_pose: How many its pose has (v,).
         weight: Weight of its rows in the fit (v,).
-        stated: Variance that rows of its pose state, their mean (v,), m^2.
+        stated: Covariance that rows of its pose state, their mean (v, m, m), base frame, m^2.
         own: Variance that the fit took each shot to have of its own beside, m^2.
         targets: Which of the fitted targets are looked at (t,), m = 3 t.
     """
@@ -65,7 +66,8 @@ class Visits:
         held = np.repeat(parts[:, targets], AXES, axis=1)
         left = np.where(held, fitted.residual[:, columns_of(targets)], 0.0)
         pose = _poses(found, fitted)
-        stated = means(np.square(fitted.data.stated_sigma_m), pose)[pose]
+        frames = found.models[found.model_name].setup.frames
+        stated = means(own_covariances(fitted.data, found.groups, frames), pose)[pose]
         _, group = np.unique(fitted.data.group, return_inverse=True)
         order = np.lexsort((progress, group.reshape(-1)))
         order = order[(trusted & held.any(axis=1) & _fullest(held, pose))[order]]
@@ -81,7 +83,7 @@ class Visits:
             np.bincount(visits)[some].astype(np.float64),
             np.bincount(pose[order])[pose[rows]].astype(np.float64),
             fitted.weight[rows],
-            stated[rows],
+            of_all_targets(stated[rows], len(targets)),
             _own(found, np.where(held, left, np.nan)[order], pose[order], stated[order]),
             targets,
         )
@@ -101,10 +103,10 @@ class Visits:
         """
         size = of_row.shape[1]
         unit = np.eye(size)
-        own = np.minimum(self.own, np.linalg.eigvalsh(of_row)[:, 0]) + self.stated
-        whole = of_row + self.stated[:, None, None] * unit
+        own = np.minimum(self.own, np.linalg.eigvalsh(of_row)[:, 0])[:, None, None] * unit + self.stated
+        whole = of_row + self.stated
         apart, shots = self._apart(whole, joints), self.of_pose[:, None, None]
-        in_common = whole - own[:, None, None] * (1.0 - 1.0 / shots) * unit - apart / shots
+        in_common = whole - own * (1.0 - 1.0 / shots) - apart / shots
         each = np.arange(len(whole))
         noise = np.where(self._same[:, None, :, None], in_common[:, :, None], 0.0)
         noise[each, :, each] += apart / self.count[:, None, None]
@@ -176,11 +178,12 @@ def _fullest(held: Mask, pose: Rows) -> Mask:
 
 
 def _own(found: Calibration, left: Floats, pose: Rows, stated: Floats) -> float:
-    """Variance, m^2, that shots have of their own beside what they state (n,): what the fit took for it; of
-    constants, what is seen in what is left (n, m) of each.
+    """Variance, m^2, that shots have of their own beside what they state (n, 3, 3): what the fit took for it;
+    of constants, what is seen in what is left (n, m) of each.
     """
     if isinstance(found.spread, VariableSpread):
         return float(found.spread.posterior.shot_variance[0])
     further = np.bincount(pose)[pose] - 1.0
     own = Scatter.of(left, pose).own
-    return max(own - float(np.average(stated, weights=further)), 0.0) if further.any() else 0.0
+    stated_alike = np.trace(stated, axis1=1, axis2=2) / AXES
+    return max(own - float(np.average(stated_alike, weights=further)), 0.0) if further.any() else 0.0

@@ -13,8 +13,9 @@ from truearm.errors import Notice, UsageError, count_of
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
+from truearm.rows.own_sigmas import sigmas_of_axes, sigmas_of_turns
 from truearm.rows.used_distances import holds_distances
-from truearm.types import Floats, Rows
+from truearm.types import AXES, Floats, Rows
 
 Use = Literal["position", "pose", "targets"]
 
@@ -141,7 +142,7 @@ def core_set(
             "group": np.array([number[name] for name in data.group], dtype=np.int64),
             "targets": np.ascontiguousarray(data.targets[:, list(selection.targets)]),
             "rotations": rotations(data) if selection.orientation else None,
-            "sigma": data.stated_sigma_m,
+            "sigma": np.column_stack([sigmas_of_axes(data), sigmas_of_turns(data)]),
             "weight": np.ones(count) if weight is None else weight,
             "distances": _distances(data) if selection.distances else [],
         }
@@ -166,13 +167,14 @@ def measured_points(
         sigma_m: Their own sigma (n,), NaN where there is none; None for none at all.
     """
     count = len(values)
+    own = np.zeros(count) if sigma_m is None else np.nan_to_num(sigma_m, nan=0.0)
     return MeasurementSet(
         {
             "joints": np.ascontiguousarray(values),
             "group": np.full(count, group, dtype=np.int64),
             "targets": np.ascontiguousarray(points.reshape(count, -1, 3)),
             "rotations": None if turned is None else np.ascontiguousarray(turned),
-            "sigma": np.zeros(count) if sigma_m is None else np.nan_to_num(sigma_m, nan=0.0),
+            "sigma": np.column_stack([*AXES * [own], np.zeros(count)]),
             "weight": np.ones(count),
             "distances": [],
         }

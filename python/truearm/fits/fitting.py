@@ -29,9 +29,10 @@ from truearm.fits.schemes import SCHEMES
 from truearm.inputs import is_payload
 from truearm.kinds import settle
 from truearm.measurements import Measurements
+from truearm.rows.own_sigmas import own_covariances, sigmas_of_turns
 from truearm.rows.visits import fitted_poses, one_row_a_pose
 from truearm.stages import Stages, no_stages
-from truearm.types import Floats, Mask
+from truearm.types import AXES, Floats, Mask
 
 if TYPE_CHECKING:
     from truearm._core import ConstantOptions, FieldOptions
@@ -141,6 +142,7 @@ class Fits:
         scheme: One of the paper's schemes beside the constants; None where it was not asked for.
         scheme_name: Its name.
         evaluations: How often the evidence was evaluated to find the variable model's hyper-parameters.
+        groups: Names of the set-ups, in the order of their numbers.
     """
 
     data: Measurements
@@ -152,6 +154,7 @@ class Fits:
     scheme: SchemeFit | None = None
     scheme_name: str = ""
     evaluations: int = 0
+    groups: Sequence[str] = ()
 
     def after(self, before: "Fits | None") -> "Fits":
         """This one, with the time and the evaluations of a fit that its search began at."""
@@ -175,12 +178,19 @@ class Fits:
 
 
 def constant_variances(fits: Fits, selection: Selection) -> Floats:
-    """Variances (n, m) that the constant fit took for what its rows hold, those of distances (n, 1)."""
+    """Variances (n, m) that the constant fit took for what its rows hold, base frame, those of distances
+    (n, 1).
+    """
     position, orientation = fits.constant.noise
-    width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
-    variance = np.repeat((position**2 + fits.data.stated_sigma_m**2)[:, None], width, axis=1)
+    data = fits.data
+    own = np.square(data.stated_sigma_m)[:, None]
+    if not selection.distances:
+        covariances = own_covariances(data, fits.groups, fits.constant.setup.frames)
+        own = np.tile(np.diagonal(covariances, axis1=1, axis2=2), (1, len(selection.targets)))
+    variance = position**2 + own
     if selection.orientation:
-        variance[:, -3:] = orientation**2
+        turned = orientation**2 + np.square(sigmas_of_turns(data))[:, None]
+        variance = np.concatenate([variance, np.repeat(turned, AXES, axis=1)], axis=1)
     return variance
 
 
@@ -220,7 +230,18 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
             scheme = _fit_scheme(task, constant, found, one_row_a_pose(data))
         seconds[task.options.model] = time.perf_counter() - began
     evaluations = 0 if variable is None else variable.evaluations
-    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model, evaluations)
+    return Fits(
+        data=data,
+        nominal=nominal,
+        identifiability=found,
+        constant=constant,
+        variable=variable,
+        seconds=seconds,
+        scheme=scheme,
+        scheme_name=task.options.model,
+        evaluations=evaluations,
+        groups=task.groups,
+    )
 
 
 @dataclass(frozen=True, eq=False)

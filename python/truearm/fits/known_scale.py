@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truearm.measurements import Measurements
+from truearm.rows.own_sigmas import sigmas_of_turns
 from truearm.types import Floats
 
 
@@ -22,20 +24,24 @@ class KnownScale:
         widened: Factor on the standard deviations of an update. The noise of a robust loss is a median, which
             is theirs of normal errors alone: it is the root mean square of what rows that are no outliers
             leave, in units of it. One for least squares, and for what varies.
+        sigma_rad: What half of the rows state as the sigma of their orientation, or less, rad; zero where
+            more of them state none.
     """
 
     freedom: int
     sigma_m: float | None
     common: float = 0.0
     widened: float = 1.0
+    sigma_rad: float = 0.0
 
     @classmethod
     def of(
-        cls, residual: Floats, rank: int, stated: Floats | None, common: float, widened: float = 1.0
+        cls, residual: Floats, rank: int, data: Measurements, common: float, widened: float = 1.0
     ) -> "KnownScale":
-        """Internal: that of residuals, zero where not measured, `rank` unknowns and stated sigmas (n,), m."""
-        usual = 0.0 if stated is None else usual_sigma(np.nan_to_num(stated))
-        return cls(max(int(np.count_nonzero(residual)) - rank, 1), usual, common, widened)
+        """Internal: that of residuals, zero where not measured, of `rank` unknowns and of rows."""
+        freedom = max(int(np.count_nonzero(residual)) - rank, 1)
+        turned = usual_sigma(sigmas_of_turns(data))
+        return cls(freedom, usual_sigma(data.stated_sigma_m), common, widened, turned)
 
 
 def usual_sigma(stated_m: Floats) -> float:

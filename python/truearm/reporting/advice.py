@@ -22,7 +22,8 @@ from truearm.doubts.of_results import (
 from truearm.doubts.one_anchor import ONE_ANCHOR
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE
 from truearm.doubts.row_order import ORDER_OF_POSES
-from truearm.doubts.uneven_setups import UNEVEN_SETUPS
+from truearm.doubts.uneven_axes import UNEVEN_AXES
+from truearm.doubts.uneven_setups import UNEVEN_SETUPS, UNEVEN_TURNS
 from truearm.errors import count_of, short_names
 from truearm.fits.details import ANOTHER_PLACE
 from truearm.fits.identifiability import BASE, SETUP
@@ -249,11 +250,16 @@ def _moved_meanwhile(facts: Facts) -> Iterator[Advice]:
         yield Advice("setup_turning", "Let the device settle.", words, facts.mean_mm())
 
 
-def _uneven_setups(facts: Facts) -> Iterator[Advice]:
-    if words := facts.noticed(UNEVEN_SETUPS):
-        # Outliers come first: without them there may be less to state.
-        weight = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm()
-        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, weight)
+def _uneven(facts: Facts) -> Iterator[Advice]:
+    # Outliers come first: without them there may be less to state.
+    weight, told = facts.mean_mm() if facts.summary["outliers"] else 2.0 * facts.mean_mm(), facts.noticed
+    for advice in (
+        Advice(UNEVEN_SETUPS, "State sigma_mm.", told(UNEVEN_SETUPS), weight),
+        Advice(UNEVEN_TURNS, "State sigma_mrad.", told(UNEVEN_TURNS), weight),
+        Advice(UNEVEN_AXES, "State sigma_x_mm, sigma_y_mm, sigma_z_mm.", told(UNEVEN_AXES), weight),
+    ):
+        if advice.words:
+            yield advice
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:
@@ -426,7 +432,7 @@ RULES: Final = (
     _warm_up,
     _moved_meanwhile,
     _unused_column,
-    _uneven_setups,
+    _uneven,
     _on_a_grid,
     _at_few_values,
     _held_one_way,

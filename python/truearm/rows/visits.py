@@ -89,15 +89,25 @@ def _one_row_each(data: Measurements, numbers: Rows) -> Measurements:
     sigma, weight = data.sigma_m, None
     if sigma is not None:
         weight = 1.0 / np.square(sigma) if (sigma > 0.0).all() else np.ones(len(data))
-        squares = np.bincount(numbers, np.square(weight * sigma))
-        sigma = np.sqrt(squares) / np.bincount(numbers, weight)
     return replace(
         data.select(first),
         readings=means(data.readings, numbers),
         targets=means(data.targets, numbers, weight),
         orientations=_mean_orientations(data, numbers),
-        sigma_m=sigma,
+        sigma_m=_of_means(sigma, numbers, weight),
+        sigma_axes_m=_of_means(data.sigma_axes_m, numbers, weight),
+        sigma_rad=_of_means(data.sigma_rad, numbers),
     )
+
+
+def _of_means(sigma: Floats | None, numbers: Rows, weight: Floats | None = None) -> Floats | None:
+    """Standard deviations of the weighted means of each number's rows, from those of the rows (n, ...)."""
+    if sigma is None:
+        return None
+    given = np.ones(len(numbers)) if weight is None else weight
+    squares = np.zeros((numbers.max() + 1, *sigma.shape[1:]))
+    np.add.at(squares, numbers, np.square((sigma.T * given).T))
+    return np.asarray((np.sqrt(squares).T / np.bincount(numbers, given)).T)
 
 
 def _mean_orientations(data: Measurements, numbers: Rows) -> Floats | None:

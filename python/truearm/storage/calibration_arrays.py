@@ -48,6 +48,8 @@ OF_EACH_ROW: Final[Mapping[str, tuple[Good, str]]] = {
     "rows.targets": (_whole, WHOLE),
     "rows.orientations": (_whole, WHOLE),
     "rows.sigma_m": (_no_less_than_zero, POSITIVE),
+    "rows.sigma_axes_m": (_no_less_than_zero, POSITIVE),
+    "rows.sigma_rad": (_no_less_than_zero, POSITIVE),
     "rows.distance_m": (_no_less_than_zero, POSITIVE),
     "outcome.weight": (lambda values: (values >= 0.0) & (values <= 1.0), "Weights are between 0 and 1"),
 }

@@ -209,7 +209,7 @@ def _scale_of(rows: FittedRows | None, measured: MeasuredParts, rank: int, noise
         return KnownScale(max(measured.values - rank, 1), None)
     targets, stated_m = measured.targets.shape[1], rows.data.stated_sigma_m
     common = common_share(rows.residual, rows.weight, targets, noise_m, stated_m)
-    return KnownScale.of(rows.residual, rank, rows.data.sigma_m, common)
+    return KnownScale.of(rows.residual, rank, rows.data, common)
 
 
 def _read_constant(content: Mapping[str, Any], arrays: Arrays) -> ConstantDetails:

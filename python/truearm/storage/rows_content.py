@@ -17,7 +17,10 @@ from truearm.tables.same_tables import called_as_files
 
 Arrays = dict[str, NDArray[Any]]
 
-NUMBERS: Final = ("readings", "targets", "orientations", "sigma_m", "distance_m", "rows")
+NUMBERS: Final = (
+    *("readings", "targets", "orientations", "sigma_m", "distance_m", "rows"),
+    *("sigma_axes_m", "sigma_rad"),
+)
 CALLED: Final = "default_group"
 WORDS: Final = ("group", "sources", "anchor", "pair", "purpose", CALLED)
 OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")

@@ -13,6 +13,15 @@ from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
 TARGET_COLUMN: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
 SIGMA_COLUMN: Final = re.compile(r"sigma(?:_(m|mm))?")
+SIGMA_OF_AXIS: Final = re.compile(r"sigma_([xyz])(?:_(m|mm))?")
+SIGMA_OF_TURN: Final = re.compile(r"sigma_(rad|mrad|deg)")
+SIGMA_COLUMNS: Final = (SIGMA_COLUMN, SIGMA_OF_AXIS, SIGMA_OF_TURN)
+SIGMA: Final = "sigma"
+"""What only columns of standard deviations begin with."""
+SIGMAS: Final = (
+    "sigma_mm of each coordinate of a position; sigma_x_mm, sigma_y_mm and sigma_z_mm of each by itself; "
+    "sigma_mrad of an orientation; lengths in m as well, angles in rad and deg"
+)
 DISTANCE_COLUMN: Final = re.compile(r"distance(?:_(m|mm))?")
 QUATERNION: Final = ("qw", "qx", "qy", "qz")
 WORDS: Final = ("group", "anchor", "pair")
@@ -56,6 +65,8 @@ class Layout:
         targets: Three columns for each measured point.
         quaternion: Whether qw, qx, qy, qz are there.
         sigma: Column of the standard deviation of the position.
+        sigma_axes: The three columns of that along each axis; none where it is not stated so.
+        sigma_turn: Column of the standard deviation of the orientation.
         distance: Column of measured distances.
         words: Which of group, anchor and pair are there.
         others: Names of all further columns.
@@ -68,6 +79,8 @@ class Layout:
     distance: Column | None = None
     words: tuple[str, ...] = ()
     others: list[str] = field(default_factory=list)
+    sigma_axes: tuple[Column, ...] = ()
+    sigma_turn: Column | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +118,9 @@ def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str, measur
     finder = _Finder(names, stated, where)
     layout = Layout(joints=finder.joints(), targets=finder.targets())
     layout.quaternion = finder.has_quaternion()
-    layout.sigma = finder.single(SIGMA_COLUMN)
+    layout.sigma, layout.sigma_axes = finder.single(SIGMA_COLUMN), finder.sigma_axes()
+    layout.sigma_turn = finder.sigma_turn()
+    finder.check_sigmas(layout)
     layout.distance = finder.single(DISTANCE_COLUMN)
     layout.words = tuple(word for word in WORDS if word in names)
     if measured and not layout.targets and layout.distance is None:
@@ -194,6 +209,40 @@ class _Finder:
                 self._claim(found, pattern.pattern, Column(name, match[1] or ""))
         return self._length(next(iter(found.values()))) if found else None
 
+    def sigma_axes(self) -> tuple[Column, ...]:
+        found: dict[str, Column] = {}
+        for name in self.names:
+            match = SIGMA_OF_AXIS.fullmatch(name)
+            if match:
+                self._claim(found, match[1], Column(name, match[2] or ""))
+        for axis in COORDINATES if found else ():
+            if axis not in found:
+                raise self.missing(f"{SIGMA}_{axis}", f'Column "{SIGMA}_{axis}" is missing')
+        self._same_unit(list(found.values()), ONE_UNIT)
+        return tuple(self._length(found[axis]) for axis in COORDINATES if found)
+
+    def sigma_turn(self) -> Column | None:
+        found: dict[str, Column] = {}
+        for name in self.names:
+            match = SIGMA_OF_TURN.fullmatch(name)
+            if match:
+                self._claim(found, SIGMA, Column(name, match[1]))
+        return found.get(SIGMA)
+
+    def check_sigmas(self, layout: Layout) -> None:
+        """Refuse sigmas of one thing that are stated twice, and names of sigmas that mean nothing."""
+        if layout.sigma is not None and layout.sigma_axes:
+            self._claim({SIGMA: layout.sigma}, SIGMA, layout.sigma_axes[0])
+        strange = [name for name in self.names if name not in self.used and canonical(name).startswith(SIGMA)]
+        if strange:
+            raise InputError(
+                f'column "{strange[0]}" begins with "{SIGMA}" and is none that is known',
+                where=self.where,
+                rule=f"Known are {SIGMAS}",
+                way_out="Rename it; what is no standard deviation of what was measured needs another name, "
+                "and counts as a feature",
+            )
+
     def missing(self, name: str, what: str) -> MissingColumnError:
         others = [other for other in self.names if other not in self.used]
         return MissingColumnError(
@@ -256,5 +305,5 @@ def _unit_in_words(column: Column) -> str:
 
 def means_something(name: str) -> bool:
     """Whether a column of this name is no feature: a joint, part of a measurement, or a word about it."""
-    patterns = (JOINT, TARGET_COLUMN, SIGMA_COLUMN, DISTANCE_COLUMN)
+    patterns = (JOINT, TARGET_COLUMN, *SIGMA_COLUMNS, DISTANCE_COLUMN)
     return name in QUATERNION + WORDS or any(pattern.fullmatch(name) for pattern in patterns)

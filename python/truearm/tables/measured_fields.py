@@ -5,13 +5,12 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from truearm.errors import InputError, Notice, list_names, list_rows
+from truearm.errors import Notice, list_names
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
 from truearm.tables.columns import (
     PURPOSE,
     PURPOSES,
     QUATERNION,
-    Column,
     Layout,
     StatedUnits,
     canonical,
@@ -20,12 +19,11 @@ from truearm.tables.columns import (
     read_layout,
 )
 from truearm.tables.reading import Table
+from truearm.tables.row_values import refuse_rows, si_values
 from truearm.tables.same_tables import own_anchor
+from truearm.tables.sigmas import read_sigmas
 from truearm.types import Floats, Mask, Texts
-from truearm.units import to_si
 
-LARGEST_SIGMA_M: Final = 10.0
-"""No instrument is less sure of a point that it has seen."""
 SAME_PLACE_M: Final = 1e-9
 """Coordinates that differ by less are one, in whatever unit they were written."""
 ONE_ANCHOR: Final = "anchor 1"
@@ -46,16 +44,16 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
-    sigma = _sigma(table, layout.sigma) if layout.sigma else None
+    sigmas = read_sigmas(table, layout)
     own = ONE_ANCHOR if "group" in layout.words else str(own_anchor(np.array(default_group)))
-    ends = _ends(table, layout, (distance, sigma), own)
+    ends = _ends(table, layout, (distance, sigmas["sigma_m"]), own)
     purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
         "readings": readings,
         "targets": targets,
         "orientations": _orientations(table) if layout.quaternion else None,
-        "sigma_m": sigma,
+        **sigmas,
         "group": _group(table, layout, default_group),
         "features": features,
         "sources": np.full(table.row_count, table.where),
@@ -89,26 +87,23 @@ def read_joint_columns(table: Table, stated: StatedUnits) -> Floats:
     return _readings(table, layout)
 
 
-def _si(table: Table, column: Column) -> Floats:
-    values = table.numbers(column.name)
-    return to_si(values, column.unit) if column.unit else values.copy()
-
-
 def _readings(table: Table, layout: Layout) -> Floats:
-    readings = np.column_stack([_si(table, column) for column in layout.joints])
+    readings = np.column_stack([si_values(table, column) for column in layout.joints])
     for column, values in zip(layout.joints, readings.T, strict=True):
-        _refuse(table, np.isnan(values), f'column "{column.name}" is empty in', "Every row needs all joints")
+        refuse_rows(
+            table, np.isnan(values), f'column "{column.name}" is empty in', "Every row needs all joints"
+        )
     return readings
 
 
 def _targets(table: Table, layout: Layout) -> Floats:
     targets = np.full((table.row_count, len(layout.targets), 3), np.nan)
     for number, columns in enumerate(layout.targets):
-        targets[:, number] = np.column_stack([_si(table, column) for column in columns])
+        targets[:, number] = np.column_stack([si_values(table, column) for column in columns])
         empty = np.isnan(targets[:, number])
         names = list_names([column.name for column in columns])
         rule = "A point is measured with all three coordinates, or all three cells are empty"
-        _refuse(table, _is_partial(empty), f"only some of {names} are given in", rule)
+        refuse_rows(table, _is_partial(empty), f"only some of {names} are given in", rule)
     return targets
 
 
@@ -138,11 +133,11 @@ def _orientations(table: Table) -> Floats | None:
     if empty.all():
         return None
     rule = "An orientation has all four numbers, or all four cells are empty"
-    _refuse(table, _is_partial(empty), 'only some of "qw" to "qz" are given in', rule)
+    refuse_rows(table, _is_partial(empty), 'only some of "qw" to "qz" are given in', rule)
     length: Floats = np.sqrt(np.square(q).sum(axis=1))
     off = np.abs(length - 1.0) > UNIT_TOLERANCE
     worst = length[np.nanargmax(np.abs(length - 1.0))] if off.any() else 1.0
-    _refuse(
+    refuse_rows(
         table,
         off,
         f"the quaternion qw qx qy qz has not length 1 (up to {worst:.6g}) in",
@@ -152,28 +147,14 @@ def _orientations(table: Table) -> Floats | None:
     return q / length[:, None]
 
 
-def _sigma(table: Table, column: Column) -> Floats:
-    sigma = _si(table, column)
-    bad = ~(sigma > 0.0)
-    _refuse(table, bad, f'column "{column.name}" is empty, zero or negative in', "A sigma is positive")
-    _refuse(
-        table,
-        sigma > LARGEST_SIGMA_M,
-        f'column "{column.name}" is larger than {LARGEST_SIGMA_M:g} m in',
-        "A sigma is the standard deviation of a measured coordinate",
-        "Leave out rows in which nothing was measured, or check its unit: sigma is in m, sigma_mm in mm",
-    )
-    return sigma
-
-
 def _distances(table: Table, layout: Layout) -> Floats | None:
     """Measured distances (n,), NaN where there is none; None where there is none at all."""
     if layout.distance is None:
         return None
-    distance = _si(table, layout.distance)
+    distance = si_values(table, layout.distance)
     if np.isnan(distance).all():
         return None
-    _refuse(
+    refuse_rows(
         table,
         distance <= 0.0,
         f'column "{layout.distance.name}" is not positive in',
@@ -187,14 +168,14 @@ def _check_measured(table: Table, targets: Floats, distance: Floats | None) -> N
     measured = np.any(np.all(np.isfinite(targets), axis=2), axis=1)
     if distance is not None:
         measured = measured | np.isfinite(distance)
-    _refuse(table, ~measured, "nothing was measured in", "Every row needs a position or a distance")
+    refuse_rows(table, ~measured, "nothing was measured in", "Every row needs a position or a distance")
 
 
 def _group(table: Table, layout: Layout, default: str) -> Texts:
     if "group" not in layout.words:
         return np.full(table.row_count, default)
     groups = table.names_in("group")
-    _refuse(
+    refuse_rows(
         table,
         ~_is_given(groups, table.row_count),
         'column "group" is empty in',
@@ -220,8 +201,8 @@ def _ends(
     has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
     rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
     found = np.isfinite(distance)
-    _refuse(table, found & ~has_anchor & ~has_pair, "the distance leads nowhere in", rule)
-    _refuse(table, found & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
+    refuse_rows(table, found & ~has_anchor & ~has_pair, "the distance leads nowhere in", rule)
+    refuse_rows(table, found & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
     if pair is not None:
         _check_pairs(table, pair, distance)
         _check_alike(table, pair, "distances", distance)
@@ -265,16 +246,18 @@ def _is_partial(empty: Mask) -> Mask:
 def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
     _, index, count = np.unique(pair, return_inverse=True, return_counts=True)
     lonely = (pair != "") & (count[index] != 2)
-    _refuse(table, lonely, 'not exactly two rows share the name in "pair" in', "A pair is two rows")
+    refuse_rows(table, lonely, 'not exactly two rows share the name in "pair" in', "A pair is two rows")
     empty = (pair != "") & np.isnan(distance)
-    _refuse(table, empty, "the distance of a pair is empty in", "Both rows of a pair hold the same distance")
+    refuse_rows(
+        table, empty, "the distance of a pair is empty in", "Both rows of a pair hold the same distance"
+    )
 
 
 def _check_alike(table: Table, pair: Texts, what: str, values: Floats) -> None:
     """Refuse a pair whose two rows hold different values (n,), m."""
     for name in np.unique(pair[pair != ""]):
         first, second = values[pair == name]
-        _refuse(
+        refuse_rows(
             table,
             (pair == name) & (first != second),
             f'pair "{name}" has two {what}, {first:g} m and {second:g} m, in',
@@ -318,11 +301,3 @@ def _features(table: Table, layout: Layout, known: tuple[str, ...]) -> tuple[pd.
         notices.append(Notice("column_names", text))
     index = pd.RangeIndex(table.row_count)
     return pd.DataFrame({name: table.numbers(name) for name in numeric}, index=index), notices
-
-
-def _refuse(
-    table: Table, bad: Mask, what: str, rule: str, way_out: str = "Correct or remove the rows"
-) -> None:
-    if bad.any():
-        rows = list_rows(table.row_numbers[bad].tolist())
-        raise InputError(f"{what} {rows}", where=table.where, rule=rule, way_out=way_out)

@@ -18,11 +18,12 @@ from truearm.fits.known_scale import usual_sigma
 from truearm.judgement.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
+from truearm.rows.own_sigmas import of_all_targets, own_covariances, sigmas_of_turns
 from truearm.rows.visits import pose_numbers
-from truearm.types import Floats, Mask, Rows
+from truearm.types import AXES, Floats, Mask, Rows
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.revisits import UNSEEN, Apart
-from truearm.updating.scale import known_scale, sigmas_m
+from truearm.updating.scale import known_scale, stated_data
 from truearm.updating.unknowns import Unknowns, is_part_of
 
 RANK: Final = 1e-9
@@ -225,23 +226,34 @@ class Scene:
         Noise of computed rows is next to nothing; that they are off by less than FINEST tells of no arm.
         """
         noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
-        stated = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
+        stated = self._stated_beyond_noise(state)
         finest = FINEST**2 * np.eye(len(self.orientation))
         return self._widened**2 * noise, self._widened**2 * stated, finest
 
-    def _stated_beyond_noise(self) -> Floats:
-        """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.
+    def _stated_beyond_noise(self, state: State) -> Floats:
+        """Covariances (n, m, m) of what rows state as their sigma, beyond the noise that holds the device's
+        already.
 
         It does where most of the calibration's own rows stated none: then the larger of both counts. What
         constants alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of
         the calibration were, whose noise is what they left beyond their own.
         """
-        stated, details = sigmas_m(self._calibration, self.data) ** 2, self._calibration.variable
+        task, details = self.task, self._calibration.variable
+        own = stated_data(self._calibration, self.data)
+        points = own_covariances(own, task.groups, state.setup.frames)
+        turns = np.square(sigmas_of_turns(own))
         learned = self._calibration.learned_from
-        if details is None or learned is None or usual_sigma(learned.data.stated_sigma_m) > 0.0:
-            return stated
-        noise, _ = noises_of(details.hyper)
-        return np.maximum(stated - (details.inflation * noise) ** 2, 0.0)
+        if details is not None and learned is not None:
+            noises = [details.inflation * noise for noise in noises_of(details.hyper)]
+            if usual_sigma(learned.data.stated_sigma_m) == 0.0:
+                points *= _beyond(np.square(own.stated_sigma_m), noises[0])[:, None, None]
+            if usual_sigma(sigmas_of_turns(learned.data)) == 0.0:
+                turns *= _beyond(turns, noises[1])
+        stated = np.zeros((len(own), *2 * self.orientation.shape))
+        size = AXES * len(task.selection.targets)
+        stated[:, :size, :size] = of_all_targets(points, len(task.selection.targets))
+        stated[:, self.orientation, self.orientation] = turns[:, None]
+        return stated
 
     @property
     def _widened(self) -> float:
@@ -316,6 +328,11 @@ class Scene:
         own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
         chosen = self.number[:, None] == np.arange(len(self.task.groups))
         return np.asarray((own[:, :, None] * chosen[:, None, :, None]).reshape(*own.shape[:2], -1))
+
+
+def _beyond(squares: Floats, noise: float) -> Floats:
+    """Parts (n,) of variances (n,) that are beyond that of a noise."""
+    return np.asarray(np.maximum(1.0 - noise**2 / np.where(squares > 0.0, squares, np.inf), 0.0))
 
 
 def motion_between(before: Floats, after: Floats) -> Floats:

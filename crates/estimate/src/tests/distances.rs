@@ -8,7 +8,7 @@ use crate::distance::derivatives;
 use crate::layout::Layout;
 use crate::packets::Packets;
 use crate::pass::normal_equations;
-use crate::{ConstantOptions, Noise, Prior, Robust, fit_constant};
+use crate::{ConstantOptions, Noise, Prior, Robust, Sigma, fit_constant};
 
 const ANCHORS: [[f64; 3]; 2] = [[1.5, 0.2, -0.4], [-0.3, 1.8, 0.9]];
 
@@ -30,7 +30,7 @@ fn derivatives_to_anchors_and_between_poses_are_the_differences() {
 #[test]
 fn normal_equations_are_the_sum_over_weighted_rows() {
     let mut scene = scene(&ANCHORS);
-    scene.set.sigma[3] = 2e-3;
+    scene.set.sigma[3] = Sigma::of_position(2e-3);
     let mut weight = vec![1.0; scene.set.pose_count()];
     (weight[2], weight[5]) = (0.0, 0.3);
     let (problem, point) = (scene.problem(), scene.point());
@@ -38,7 +38,7 @@ fn normal_equations_are_the_sum_over_weighted_rows() {
     let packets = Packets::new(&scene.set);
     let normal = normal_equations(&problem, &packets, point, Some((noise, &weight))).unwrap();
     let (rows, width) = (derivatives(&problem, point).unwrap(), Layout::new(&problem).len());
-    let variance = |pose: usize| noise.position.powi(2) + scene.set.sigma[pose].powi(2);
+    let variance = |pose: usize| noise.position.powi(2) + scene.set.sigma[pose].of_length().powi(2);
     let weights: Vec<f64> = scene.set.distances.iter().map(|d| weight[d.pose] / variance(d.pose)).collect();
     let tolerance = 1e-13 * normal.matrix.norm_max();
     for i in 0..width {

@@ -8,7 +8,7 @@ use crate::common::root_mean_square;
 use crate::common::scene::{Plan, Scene};
 use truearm_estimate::{
     ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior, Problem,
-    Setup, fit_constant, identifiability, linearise, residuals, setup_precision,
+    Setup, Sigma, fit_constant, identifiability, linearise, residuals, setup_precision,
 };
 use truearm_kinematics::{Cancel, Cancelled};
 
@@ -36,7 +36,7 @@ fn arrays_of_another_length() {
     assert_refused("joints has 239 values where 240 are needed", |set| set.joints.truncate(239));
     assert_refused("targets has 237 values where 240", |set| set.targets.truncate(237));
     assert_refused("rotations has 359 values where 360", |set| set.rotations.truncate(359));
-    assert_refused("sigma has 41 values where 40", |set| set.sigma.push(0.0));
+    assert_refused("sigma has 41 values where 40", |set| set.sigma.push(Sigma::default()));
     assert_refused("weight has 0 values where 40", |set| set.weight.clear());
 }
 
@@ -45,7 +45,7 @@ fn values_that_are_not_finite_with_their_pose() {
     assert_refused("joint value is not finite at pose 17", |set| set.joints[6 * 17 + 4] = f64::NAN);
     assert_refused("target is not finite at pose 9", |set| set.targets[6 * 9 + 5] = f64::INFINITY);
     assert_refused("rotation is not finite at pose 39", |set| set.rotations[9 * 39 + 8] = f64::NEG_INFINITY);
-    assert_refused("sigma is not finite at pose 3", |set| set.sigma[3] = f64::NAN);
+    assert_refused("sigma is not finite at pose 3", |set| set.sigma[3] = Sigma::of_position(f64::NAN));
     assert_refused("weight is not finite at pose 0", |set| set.weight[0] = f64::INFINITY);
 }
 
@@ -61,7 +61,7 @@ fn targets_and_orientations_of_which_a_part_is_missing() {
 fn values_out_of_range() {
     assert_refused("weight is -0.5", |set| set.weight[3] = -0.5);
     assert_refused("weight is 2, but weights are between 0 (left out) and 1", |set| set.weight[3] = 2.0);
-    assert_refused("sigma is -0.001", |set| set.sigma[3] = -1e-3);
+    assert_refused("sigma is -0.001", |set| set.sigma[3] = Sigma::of_position(-1e-3));
     assert_refused("group is 1, but groups count from 0", |set| set.group[3] = 1);
 }
 

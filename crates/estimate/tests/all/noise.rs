@@ -5,7 +5,8 @@ use crate::common::arms::{rv_m2, rv_m2_fifteen, ur10, ur10_columns, ur10_determi
 use crate::common::root_mean_square;
 use crate::common::scene::{Plan, Scene};
 use crate::common::stream::Stream;
-use truearm_estimate::{ConstantFit, ConstantOptions, FrameMode, Noise, Prior, fit_constant};
+use truearm_estimate::{ConstantFit, ConstantOptions, FrameMode, Noise, Prior, Sigma, fit_constant};
+use truearm_kinematics::Transform;
 
 const SEEDS: std::ops::Range<u64> = 0..60;
 const TWO_SIDED_95: f64 = 1.96;
@@ -96,7 +97,7 @@ fn two_instruments(seed: u64) -> Scene {
     let mut scene = Plan { seed, noise: (5e-5, 0.0), poses: vec![80], ..plan() }.make();
     let mut stream = Stream::new(seed + 1000);
     for pose in (0..80).step_by(2) {
-        scene.set.sigma[pose] = 2e-3;
+        scene.set.sigma[pose] = Sigma::of_position(2e-3);
         let noise = stream.normals(2e-3);
         (0..3).for_each(|k| scene.set.targets[3 * pose + k] += noise[k]);
     }
@@ -109,11 +110,66 @@ fn own_sigmas_are_respected() {
     for seed in 0..20 {
         let mut scene = two_instruments(seed);
         told.push(scene.error_of(&fit(&scene, None).parameters));
-        scene.set.sigma.fill(0.0);
+        scene.set.sigma.fill(Sigma::default());
         untold.push(scene.error_of(&fit(&scene, None).parameters));
     }
     let gain = root_mean_square(&untold) / root_mean_square(&told);
     assert!(gain > 5.0, "{gain}");
+}
+
+/// A device whose depth, along y of its frame, is twenty times as coarse as the rest, and says so.
+fn camera(seed: u64) -> Scene {
+    let mut scene = Plan { seed, noise: (5e-5, 0.0), poses: vec![80], ..plan() }.make();
+    let mut stream = Stream::new(seed + 1000);
+    for pose in 0..80 {
+        scene.set.sigma[pose] = Sigma { position: [0.0, 1e-3, 0.0], orientation: 0.0 };
+        scene.set.targets[3 * pose + 1] += stream.normals(1e-3)[0];
+    }
+    scene
+}
+
+#[test]
+fn own_sigmas_along_the_axes_of_the_device_are_respected() {
+    let (mut told, mut alike) = (Vec::new(), Vec::new());
+    for seed in 0..20 {
+        let mut scene = camera(seed);
+        let found = fit(&scene, None);
+        told.push(scene.error_of(&found.parameters));
+        assert!((found.noise.position / 5e-5 - 1.0).abs() < 0.5, "{}", found.noise.position);
+        scene.set.sigma.fill(Sigma::of_position(1e-3 / 3.0_f64.sqrt()));
+        alike.push(scene.error_of(&fit(&scene, None).parameters));
+    }
+    let gain = root_mean_square(&alike) / root_mean_square(&told);
+    assert!(gain > 2.0, "{gain}");
+}
+
+#[test]
+fn intervals_of_a_device_with_a_coarse_axis_cover() {
+    let errors: Vec<f64> =
+        SEEDS.map(camera).flat_map(|scene| standardised(&scene, &fit(&scene, None))).collect();
+    let inside = errors.iter().filter(|z| z.abs() < TWO_SIDED_95).count() as f64 / errors.len() as f64;
+    assert!((0.90..=0.98).contains(&inside), "{inside} of {} are inside", errors.len());
+}
+
+#[test]
+fn own_sigmas_of_orientations_are_respected() {
+    let error = |stated: bool| {
+        let errors = (0..20).map(|seed| {
+            let mut scene = Plan { seed, rotations: true, poses: vec![40], ..plan() }.make();
+            let mut stream = Stream::new(seed + 1000);
+            for pose in 0..20 {
+                let off = Transform::from_rotation_vector(stream.normals(0.02), [0.0; 3]);
+                let at = 9 * pose..9 * pose + 9;
+                let rotation = std::array::from_fn(|k| scene.set.rotations[9 * pose + k]);
+                let turned = off.compose(&Transform { rotation, translation: [0.0; 3] });
+                scene.set.rotations[at].copy_from_slice(&turned.rotation);
+                scene.set.sigma[pose].orientation = if stated { 0.02 } else { 0.0 };
+            }
+            scene.error_of(&fit(&scene, None).parameters)
+        });
+        root_mean_square(&errors.collect::<Vec<f64>>())
+    };
+    assert!(error(true) < 0.9 * error(false), "{} and {}", error(true), error(false));
 }
 
 #[test]

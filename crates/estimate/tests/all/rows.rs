@@ -126,7 +126,7 @@ fn without(set: &MeasurementSet, removed: &[usize]) -> MeasurementSet {
         group: kept.iter().map(|&pose| set.group[pose]).collect(),
         targets: pick(&set.targets),
         rotations: pick(&set.rotations),
-        sigma: pick(&set.sigma),
+        sigma: kept.iter().map(|&pose| set.sigma[pose]).collect(),
         weight: pick(&set.weight),
         ..set.clone()
     }

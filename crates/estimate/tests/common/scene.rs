@@ -1,7 +1,7 @@
 //! Measurements of an arm whose errors, frames and targets are known to the test and hidden from the fit.
 
 use truearm_estimate::{
-    Distance, DistanceTo, FrameMode, GroupSetup, MeasurementSet, Point, Problem, Setup, residuals,
+    Distance, DistanceTo, FrameMode, GroupSetup, MeasurementSet, Point, Problem, Setup, Sigma, residuals,
 };
 use truearm_kinematics::{Chain, Joint, Parameters, Transform};
 
@@ -91,7 +91,7 @@ impl Plan {
             group,
             targets: vec![0.0; 3 * n * self.targets],
             rotations: vec![0.0; if self.rotations { 9 * n } else { 0 }],
-            sigma: vec![0.0; n],
+            sigma: vec![Sigma::default(); n],
             weight: vec![1.0; n],
             ..MeasurementSet::default()
         }

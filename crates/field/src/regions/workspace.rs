@@ -1,8 +1,8 @@
 //! Active mode: poses are chosen in the region and measured on demand.
 
 use truearm_estimate::{
-    ChoiceOptions, Criterion, EstimateError, FrameMode, MeasurementSet, Point, Problem, Setup, choose_poses,
-    linearise,
+    ChoiceOptions, Criterion, EstimateError, FrameMode, MeasurementSet, Point, Problem, Setup, Sigma,
+    choose_poses, linearise,
 };
 use truearm_kinematics::{Cancel, Chain};
 
@@ -166,7 +166,7 @@ impl<W: Workspace> Active<'_, W> {
             } else {
                 Vec::new()
             },
-            sigma: vec![0.0; count],
+            sigma: vec![Sigma::default(); count],
             weight: vec![1.0; count],
             ..MeasurementSet::default()
         };

@@ -1,7 +1,7 @@
 //! Shots of the same pose count as one.
 
 use truearm_bank::Input;
-use truearm_estimate::MeasurementSet;
+use truearm_estimate::{MeasurementSet, Sigma};
 
 use super::common::{Measure, Truth, deviations, fit, root_mean_square, shots, six_axes, subset};
 use super::sets::rows_of;
@@ -146,8 +146,8 @@ fn noise_is_not_less_than_what_shots_differ_by() {
 fn shots_count_by_what_they_state() {
     let arm = six_axes(Truth::BENDING);
     let mut set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 10);
-    set.sigma[1] = 5e-4;
-    (set.sigma[0], set.sigma[2]) = (1e-7, 2e-7);
+    set.sigma[1] = Sigma::of_position(5e-4);
+    (set.sigma[0], set.sigma[2]) = (Sigma::of_position(1e-7), Sigma::of_position(2e-7));
     let Joined { training: found, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
     assert_eq!(pose_of, (0..90).map(|shot| shot / 3).collect::<Vec<usize>>());
     let shares: Vec<f64> = found.source[0].iter().map(|shot| shot.share).collect();
@@ -163,7 +163,7 @@ fn shots_of_two_instruments_are_told_apart_by_what_they_state() {
     let mut turn = 0.0_f64;
     for shot in 0..180 {
         let of_camera = set.group[shot] == 1;
-        set.sigma[shot] = if of_camera { coarse } else { fine };
+        set.sigma[shot] = Sigma::of_position(if of_camera { coarse } else { fine });
         for value in set.targets[3 * shot..][..3].iter_mut().filter(|_| of_camera) {
             turn += 2.4;
             *value += coarse * turn.sin();

@@ -1,7 +1,7 @@
 //! Small training sets and hyper-parameters at which nothing is negligible.
 
 use truearm_bank::Input;
-use truearm_estimate::{MeasurementSet, Point, Setup};
+use truearm_estimate::{MeasurementSet, Point, Setup, Sigma};
 
 use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
 use crate::drives::Drives;
@@ -38,7 +38,7 @@ pub fn poses_in_two_groups(poses: usize) -> Training {
     let measure = Measure { groups: 2, orientation: Some(1e-4), ..Measure::poses(poses) };
     let mut set = measure.of(&arm);
     for pose in 0..poses {
-        set.sigma[pose] = 1e-5 * (pose % 4) as f64;
+        set.sigma[pose] = Sigma::of_position(1e-5 * (pose % 4) as f64);
         set.weight[pose] = [1.0, 0.6, 1.0, 0.3, 1.0][pose % 5];
     }
     set.targets[3 * 4..3 * 5].fill(f64::NAN);
@@ -72,7 +72,7 @@ pub fn four_targets(poses: usize) -> Training {
     let measure = Measure { targets: 4, groups: 2, orientation: Some(1e-4), ..Measure::poses(poses) };
     let mut set = measure.of(&arm);
     for pose in 0..poses {
-        set.sigma[pose] = 1e-5 * (pose % 2) as f64;
+        set.sigma[pose] = Sigma::of_position(1e-5 * (pose % 2) as f64);
         set.weight[pose] = [1.0, 0.6, 1.0, 1e-3][pose % 4];
     }
     set.targets[12 * 4 + 3..12 * 4 + 6].fill(f64::NAN);

@@ -6,7 +6,7 @@ use crate::common::{
     root_mean_square, six_axes, subset,
 };
 use truearm_bank::Input;
-use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
+use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup, Sigma};
 use truearm_field::{Drives, FieldError, FieldOptions, fit_field, measurement_covariance};
 
 const NOISE: f64 = 3e-5;
@@ -17,9 +17,13 @@ fn held_out(poses: usize) -> Measure {
 
 /// Share of position components within 1.96 predicted standard deviations.
 fn coverage(arm: &Arm, fit: &Fitted, measure: &Measure) -> f64 {
-    let set = measure.of(arm);
-    let (_, deviations) = deviations(arm, fit, &set);
-    let problem = problem(arm, &set, &arm.columns);
+    coverage_of(arm, fit, &measure.of(arm))
+}
+
+/// The same of measurements.
+fn coverage_of(arm: &Arm, fit: &Fitted, set: &MeasurementSet) -> f64 {
+    let (_, deviations) = deviations(arm, fit, set);
+    let problem = problem(arm, set, &arm.columns);
     let varying = fitted(&fit.field, &set.joints);
     let point = Point { parameters: &varying, setup: &fit.field.setup };
     let covariance = measurement_covariance(&fit.field.posterior, &problem, point, &set.joints).unwrap();
@@ -52,6 +56,47 @@ fn what_varies_is_found_and_intervals_hold() {
     assert_noise_is_left(&arm, &fit);
     assert!((0.5..1.7).contains(&(fit.field.hyper.noise[0] / NOISE)), "{:?}", fit.field.hyper);
     assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement.outliers);
+}
+
+/// Measurements of a device that is less sure along x of its frame, whose rows state these sigmas.
+fn by_camera(arm: &Arm, measure: &Measure, off: f64, stated: [f64; 3]) -> MeasurementSet {
+    let mut set = measure.of(arm);
+    let mut random = Random::new(measure.seed + 1);
+    for pose in 0..set.pose_count() {
+        set.targets[3 * pose] += random.normals::<1>(off)[0];
+        set.sigma[pose].position = stated;
+    }
+    set
+}
+
+#[test]
+fn a_coarse_axis_of_the_device_spoils_nothing_where_rows_state_it() {
+    const OFF: f64 = 4e-4;
+    let arm = six_axes(Truth::BENDING);
+    let left = |stated: [f64; 3]| {
+        let fit = fit(&arm, &by_camera(&arm, &Measure::poses(160), OFF, stated)).unwrap();
+        (root_mean_square(&deviations(&arm, &fit, &held_out(200).of(&arm)).1), fit)
+    };
+    let (told, fit) = left([OFF, 0.0, 0.0]);
+    let (alike, _) = left([OFF / 3.0_f64.sqrt(); 3]);
+    assert!(told < 0.75 * alike, "{told} where it is told, {alike} where all axes are taken to be alike");
+    let set = by_camera(&arm, &held_out(200), OFF, [OFF, 0.0, 0.0]);
+    let share = coverage_of(&arm, &fit, &set);
+    assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
+}
+
+#[test]
+fn axes_whose_sigmas_hardly_differ_are_fitted_as_those_that_do_not() {
+    let arm = six_axes(Truth::BENDING);
+    let measure = Measure { groups: 2, targets: 2, orientation: Some(NOISE), ..Measure::poses(60) };
+    let found = [0.0, 1e-12].map(|more| {
+        let mut set = measure.of(&arm);
+        set.sigma.fill(Sigma { position: [NOISE, NOISE, NOISE + more], orientation: NOISE });
+        let fit = fit(&arm, &set).unwrap();
+        fitted(&fit.field, &set.joints)
+    });
+    let most = found[0].iter().zip(&found[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(most < 1e-6, "{most}");
 }
 
 #[test]

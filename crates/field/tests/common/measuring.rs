@@ -1,6 +1,6 @@
 //! Measurements of an arm from hidden set-ups.
 
-use truearm_estimate::MeasurementSet;
+use truearm_estimate::{MeasurementSet, Sigma};
 use truearm_kinematics::{Parameters, Transform};
 
 use super::{Arm, Random};
@@ -38,7 +38,7 @@ impl Measure {
             target_count: self.targets,
             group_count: self.groups,
             group: (0..self.poses).map(|pose| pose % self.groups).collect(),
-            sigma: vec![0.0; self.poses],
+            sigma: vec![Sigma::default(); self.poses],
             weight: vec![1.0; self.poses],
             joints,
             ..MeasurementSet::default()
@@ -95,7 +95,7 @@ pub fn subset(set: &MeasurementSet, poses: &[usize]) -> MeasurementSet {
         joints: take(&set.joints, set.joint_count),
         targets: take(&set.targets, 3 * set.target_count),
         rotations: if set.has_rotations() { take(&set.rotations, 9) } else { Vec::new() },
-        sigma: take(&set.sigma, 1),
+        sigma: poses.iter().map(|&pose| set.sigma[pose]).collect(),
         weight: take(&set.weight, 1),
         group: poses.iter().map(|&pose| set.group[pose]).collect(),
         ..set.clone()
