@@ -92,7 +92,7 @@ class OtherCause:
         return cls(LOAD, p, bent_mrad=tuple(bent.tolist()), mean_mm=mean_mm)
 
     def notice(self, *, has_rails: bool) -> Notice:
-        """What it is, and what to do."""
+        """Internal: what it is, and what to do."""
         if self.name == SCALE:
             return Notice(OTHER_SCALE, self._scale_words(has_rails=has_rails))
         return Notice(OTHER_LOAD, self._load_words())
