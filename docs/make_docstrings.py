@@ -30,6 +30,7 @@ MODULES = {
     "truearm.fits.identifiability": ("Identifiability",),
     "truearm.fits.fitted_rows": ("FittedRows",),
     "truearm.updating.moved": ("Offset", "Motion"),
+    "truearm.updating.other_cause": ("OtherCause",),
     "truearm.updating.squares": ("SquaresTest",),
     "truearm.programs.program": ("Listed",),
     "truearm.programs.densify": ("Spacing",),

@@ -243,16 +243,20 @@ def _with_slips(
     told: list[Notice],
 ) -> list[Notice]:
     """What slipped while rows were measured: where that is most of what they miss, in place of what was told
-    of the arm.
+    of the arm; where nothing did, which other scale or load explains them.
     """
-    from truearm.updating.comparing import slipped_meanwhile  # noqa: PLC0415 - scipy is slow to import
+    from truearm.updating.comparing import (  # noqa: PLC0415 - scipy is slow to import
+        explained_otherwise,
+        slipped_meanwhile,
+    )
 
     if not can_be_updated(calibration):
         return told
     with stages("looking for what slipped"):
         slipped = slipped_meanwhile(calibration, data, options.use)
+        otherwise = [] if slipped else explained_otherwise(calibration, data, options.use)
     most = any(slip.share > MOSTLY for slip in slipped)
-    return [*([] if most else told), *(slip.notice for slip in slipped)]
+    return [*([] if most else told), *otherwise, *(slip.notice for slip in slipped)]
 
 
 def _finds(task: Task, options: EvaluationOptions) -> tuple[str, ...]:

@@ -19,6 +19,8 @@ MEANWHILE: Final = (
 CHANGED_MEANWHILE: Final = {
     "holds": f"No significant change was found. {MEANWHILE}",
     "moved": f"{{tested}} changed, as far as these rows tell. {MEANWHILE}",
+    "scale": f"All lengths are others, as far as these rows tell. {MEANWHILE}",
+    "load": f"The joints give way otherwise, as far as these rows tell. {MEANWHILE}",
     "field": f"{{estimated}} do not explain what was measured. {MEANWHILE}",
 }
 """What an update from such rows found, by its verdict; `tested` and `estimated` are listed."""
@@ -36,6 +38,41 @@ def kept_words(before_mm: float, after_mm: float) -> str:
         "mm after the update. Keep it; what these poses tell is worth more in a calibration from old and new "
         "rows together."
     )
+
+
+def cause_words(told: Mapping[str, Any]) -> str:
+    """Which other scale or load was found, in a sentence; "" for none.
+
+    Args:
+        told: What `Update.to_dict` gives.
+    """
+    cause = told.get("cause")
+    if cause is None:
+        return ""
+    then = "than when the arm was calibrated"
+    if cause["name"] == "scale":
+        way = "larger" if cause["ppm"] > 0.0 else "smaller"
+        whose = "" if cause["taken"] else ", or the measuring device's scale differs"
+        return f"All lengths are {abs(cause['ppm']):.0f} ppm {way} {then}{whose}."
+    way, weight = ("more", "a heavier") if sum(cause["bent_mrad"]) > 0.0 else ("less", "a lighter")
+    return f"The joints give way {way} {then}, as under {weight} weight."
+
+
+def found_otherwise(told: Mapping[str, Any], tested: str) -> str:
+    """The verdict where another scale or load was found, in sentences; "" for none.
+
+    Args:
+        told: What `Update.to_dict` gives.
+        tested: What was tested for a change, as a sentence begins.
+    """
+    found = cause_words(told)
+    if not found:
+        return ""
+    fits = "All else still fits"
+    if told["changed"]["p"] < told["threshold"]:
+        fits = f"{tested} changed as well; all else still fits"
+    stored = "with it" if told["cause"]["taken"] else "without it: it is right for an arm as it was then"
+    return f"{found} {fits}. The updated calibration is {stored}."
 
 
 def of_known_world(told: Mapping[str, Any]) -> str:

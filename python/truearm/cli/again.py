@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from truearm.cli.command_words import calibrate_lacks, option_words, update_lacks, update_words
 from truearm.errors import list_names, typed
+from truearm.update_words import cause_words
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -196,6 +197,8 @@ def _why_apart(report: Mapping[str, Any], before: "Calibration", since: "Sequenc
     """Why rows before an update cannot be calibrated from with later ones; "" where they can."""
     if report["verdict"] == FIELD:
         return NO_LONGER
+    if found := cause_words(report):
+        return f"the update found: {found.rstrip('.')}"
     moved = [str(offset["joint"]) for offset in report["offsets"] if offset["moved"]]
     if moved:
         return f"the update found that {'joint' if len(moved) == 1 else 'joints'} {', '.join(moved)} moved"

@@ -37,6 +37,7 @@ def command(
     keep_frame: option.KeepFrame = False,
     keep_tool: option.KeepTool = False,
     new_tool: option.NewTool = False,
+    take_scale: option.TakeScale = False,
     offset_deg: option.OffsetDeg = OFFSET_DEG,
     tool_mm: option.ToolMm = TOOL_MM,
     level: option.Level = LEVEL,
@@ -75,6 +76,7 @@ def command(
         keep_frame=keep_frame,
         keep_tool=keep_tool,
         new_tool=new_tool,
+        take_scale=take_scale,
         level=level,
         use=use,  # type: ignore[arg-type]
     )
@@ -175,21 +177,37 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
         suggest(*(compensate_commands(known, old) or [f"truearm report {typed(old)}"]))
     elif place is not None:
         suggest(f"truearm update --roll-back {typed(place)} -o OLD.calib", when="Back to the old one:")
-    elif found.verdict == "moved":
+    elif found.verdict == "moved" or (found.cause is not None and found.cause.taken):
         suggest(f"truearm update {typed(old)} {given} -o NEW.calib", when="Nothing was written. To do so:")
+    elif found.cause is not None:
+        _suggest_scale(found, f"truearm update {typed(old)} {given}")
     else:
         suggest(*(compensate_commands(known, old) or [f"truearm report {typed(old)}"]))
+
+
+def _suggest_scale(found: "Update", update: str) -> None:
+    """How a scale that was found is taken along by an update; nothing where it cannot be."""
+    if found.verdict == "scale" and "prismatic" not in found.calibration.robot.joints:
+        suggest(f"{update} --take-scale -o NEW.calib", when="If the arm works as it was measured now:")
 
 
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.update_words import CHANGED_MEANWHILE, of_known_world, untested_joints, way_out_of_keeping
+    from truearm.update_words import (
+        CHANGED_MEANWHILE,
+        found_otherwise,
+        of_known_world,
+        untested_joints,
+        way_out_of_keeping,
+    )
 
     tested, estimated = listed(found.tested, "or").capitalize(), listed(found.estimated)
     if found.changed_meanwhile:
         return CHANGED_MEANWHILE[found.verdict].format(tested=tested, estimated=estimated.capitalize())
     untested = untested_joints(found.to_dict())
+    if otherwise := found_otherwise(found.to_dict(), tested):
+        return f"{otherwise} {untested}".strip()
     if found.verdict == "holds":
         return f"The calibration still holds: no significant change was found. {untested}".strip()
     if found.verdict == "moved":

@@ -22,6 +22,9 @@ KeepTool: TypeAlias = Annotated[
 NewTool: TypeAlias = Annotated[
     bool, typer.Option("--new-tool", help="It is another target: found anew, not compared.")
 ]
+TakeScale: TypeAlias = Annotated[
+    bool, typer.Option("--take-scale", help="Take a common scale of all lengths along, where one is found.")
+]
 OffsetDeg: TypeAlias = Annotated[
     float, typer.Option(metavar="DEG", help="How far an offset may have changed (standard deviation).")
 ]

@@ -17,7 +17,7 @@ from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
-from truearm.update_words import MEANWHILE
+from truearm.update_words import MEANWHILE, cause_words
 
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4
@@ -110,6 +110,13 @@ def update_notices(calibration: Calibration) -> list[Notice]:
         return []
     if any(notice.kind in STEP_KINDS for notice in calibration.notices):
         text = f"What the update that this calibration is of was measured with changed meanwhile. {MEANWHILE}"
+        return [Notice("update", text)]
+    cause = revision.report.get("cause")
+    if cause is not None and not cause["taken"]:
+        text = (
+            f"The update that this calibration is of found: {cause_words(revision.report)} Corrections are "
+            "those of an arm as it was then."
+        )
         return [Notice("update", text)]
     if revision.report["verdict"] != "field":
         return []

@@ -11,6 +11,7 @@ from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.update_words import (
     CHANGED_MEANWHILE,
     follows_words,
+    found_otherwise,
     motion_name,
     of_known_world,
     untested_joints,
@@ -40,9 +41,9 @@ def since_update(facts: Facts) -> Section:
 
 def _overall(facts: Facts, told: Mapping[str, Any]) -> str:
     verdicts = CHANGED_MEANWHILE if facts.changed_meanwhile else VERDICTS
-    words = verdicts[told["verdict"]].format(
-        tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
-    )
+    tested, estimated = listed(told["tested"], "or").capitalize(), listed(told["estimated"]).capitalize()
+    otherwise = "" if facts.changed_meanwhile else found_otherwise(told, tested)
+    words = otherwise or verdicts[told["verdict"]].format(tested=tested, estimated=estimated)
     outliers = count_of(len(told["outliers"]), "row")
     left = f", {outliers} of them left out as outliers," if told["outliers"] else ""
     if told["verdict"] == "field" and not facts.changed_meanwhile and (base := of_known_world(told)):

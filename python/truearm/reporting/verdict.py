@@ -12,6 +12,7 @@ from truearm.outlier_fate import taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
+from truearm.update_words import cause_words
 
 GOOD: Final = 0.6
 """A calibration that leaves less than this part of the error is a good one."""
@@ -84,7 +85,14 @@ def _changed(facts: Facts) -> str:
         return " What was measured changed meanwhile: put that right first."
     if facts.update is not None and facts.update["verdict"] == "field":
         return " The calibration no longer fits the arm: measure again and calibrate."
-    return ""
+    found = "" if facts.update is None else cause_words(facts.update)
+    return f" {found}" if found else ""
+
+
+def _is_otherwise(facts: Facts) -> bool:
+    """Whether the update found another scale or load, which the calibration does not have."""
+    cause = None if facts.update is None else facts.update.get("cause")
+    return cause is not None and not cause["taken"]
 
 
 def _without_outliers(facts: Facts) -> str:
@@ -127,7 +135,7 @@ def tone(facts: Facts) -> Tone:
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"
-    doubted = facts.mostly_refused or facts.changed_meanwhile
+    doubted = facts.mostly_refused or facts.changed_meanwhile or _is_otherwise(facts)
     return "good" if after < GOOD * before and not doubted else "fair"
 
 

@@ -90,6 +90,8 @@ class Scene:
             self._known = part_of(model.setup, task.selection, calibration.selection)
         self.inputs = model_inputs(task.arm, data, task.options.features)
         self.parameters = model.parameters(self.inputs)
+        self._in_passing = self._by_cause()
+        self._by_arm = unknowns.directions + self._in_passing
         self.measured = core_set(task.arm.robot, data, task.selection, task.groups)
         self.problem: Problem = task.problem(self.measured, range(task.arm.table.size))
         self.number = np.array([task.groups.index(name) for name in data.group])
@@ -144,6 +146,10 @@ class Scene:
         """The state in which only what says nothing about a change may differ from what was known."""
         return State(np.zeros_like(state.arm), self._with_known(state.setup, self.unknowns.anew))
 
+    def in_passing(self, change: Floats) -> Floats:
+        """How parameters (n, L, 5) differ by what of a change (a,) of the arm's unknowns is no constant."""
+        return np.asarray((self._in_passing @ change).reshape(self.parameters.shape))
+
     def moved(self, state: State, step: Floats) -> State:
         """The state after a step (u,)."""
         count = len(state.arm)
@@ -152,10 +158,9 @@ class Scene:
 
     def linear(self, state: State) -> Linear:
         """Residuals and derivatives at a state."""
-        unknowns = self.unknowns
         parameters = self._moved_parameters(state)
         arm, residual = linearise(self.problem, parameters, state.setup)
-        jacobian = np.concatenate([arm @ unknowns.directions, self._setup_jacobian(state)], axis=2)
+        jacobian = np.concatenate([arm @ self._by_arm, self._setup_jacobian(state)], axis=2)
         seen = self.seen
         visit, part = np.nonzero(seen)
         pose = np.arange(len(seen)) if self.apart.contradict else self.poses
@@ -261,8 +266,15 @@ class Scene:
 
     def _moved_parameters(self, state: State) -> Floats:
         """Parameters (n, L, 5) of the arm in a state."""
-        change = (self.unknowns.directions @ state.arm).reshape(-1, 5)
+        change = (self._by_arm @ state.arm).reshape(self.parameters.shape)
         return np.ascontiguousarray(self.parameters + change)
+
+    def _by_cause(self) -> Floats:
+        """Derivatives (n, 5 L, a) of the chain's parameters by what of the arm's unknowns is no constant."""
+        arm, unknowns = self.task.arm, self.unknowns
+        found = np.zeros((len(self.data), *unknowns.directions.shape))
+        found[:, :, unknowns.caused[: found.shape[2]]] = unknowns.cause.passing(arm, self.data.readings)
+        return found
 
     @property
     def _turns(self) -> int:

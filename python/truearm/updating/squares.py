@@ -48,12 +48,13 @@ def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresT
 
     What says nothing about a change, such as a frame that is found anew, is projected out.
     """
-    residual, anew = _whitened(unchanged, unknowns, unknowns.anew)
-    _, change = _whitened(unchanged, unknowns, unknowns.free & ~unknowns.anew)
-    out = _basis(anew, NEGLIGIBLE)
-    left = residual - out @ (out.T @ residual)
-    told = _basis(change - out @ (out.T @ change), TOLD)
-    return SquaresTest.of(told.T @ left, told.shape[1], known)
+    beside = unknowns.anew | unknowns.caused
+    return _beside(unchanged, unknowns, unknowns.free & ~beside, beside, known)
+
+
+def cause_test(without: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
+    """Whether there is what else is asked for; `without` has all but that estimated."""
+    return _beside(without, unknowns, unknowns.caused, unknowns.free & ~unknowns.caused, known)
 
 
 def rest_test(estimated: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
@@ -75,6 +76,16 @@ def student_p(ratio: float, known: int) -> float:
 def wald(change: Floats, covariance: Floats, known: int) -> SquaresTest:
     """Whether changes (k,) of a covariance (k, k) are zero."""
     return SquaresTest.of(np.linalg.solve(np.linalg.cholesky(covariance), change), len(change), known)
+
+
+def _beside(estimate: Estimate, unknowns: Unknowns, tested: Mask, beside: Mask, known: int) -> SquaresTest:
+    """Whether unknowns (u,) that are `tested` are as they are held, whatever those `beside` are."""
+    residual, others = _whitened(estimate, unknowns, beside)
+    _, change = _whitened(estimate, unknowns, tested)
+    out = _basis(others, NEGLIGIBLE)
+    left = residual - out @ (out.T @ residual)
+    told = _basis(change - out @ (out.T @ change), TOLD)
+    return SquaresTest.of(told.T @ left, told.shape[1], known)
 
 
 def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Floats, Floats]:

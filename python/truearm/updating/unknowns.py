@@ -12,11 +12,13 @@ from truearm.fits.core_set import Selection
 from truearm.fits.fitting import Task
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import MeasuredParts
-from truearm.fits.parameters import KIND_COUNT, KINDS, THETA, D, are_lengths
+from truearm.fits.parameters import KIND_COUNT, KINDS, are_lengths
 from truearm.measurements import Measurements
 from truearm.types import Floats, Mask
 from truearm.units import to_si
+from truearm.updating.causes import Cause, Nothing
 from truearm.updating.options import UpdateOptions
+from truearm.updating.parts import offset_columns
 
 OPEN: Final = 1.0
 """What is found anew is known to a metre and a radian, as in the fits."""
@@ -28,14 +30,17 @@ BASE: Final = "base_"
 class Unknowns:
     """u unknowns: of the arm first, then those of each set-up: frame, targets, orientation of the target.
 
+    Those of the arm are offsets, the base where the world is known, and what else is asked for.
+
     Attributes:
         directions: Derivatives (5 L, a) of the chain's parameters by the a unknowns of the arm.
-        arm_names: Their names: joint1 ..., then base_theta ... .
+        arm_names: Their names: joint1 ..., then base_theta ..., then that of what else is asked for.
         std: Prior standard deviations (u,), m and rad; zero for what is kept.
         anew: Which are found anew (u,): they are not compared, and say nothing about what changed.
         frame: Which are of frames (u,).
         tool: Which are of targets and their orientation (u,).
         known: For each set-up of the update the number of the calibration's it may be compared with, or None.
+        cause: What else is asked for.
     """
 
     directions: Floats
@@ -45,6 +50,7 @@ class Unknowns:
     frame: Mask
     tool: Mask
     known: tuple[int | None, ...]
+    cause: Cause
 
     @classmethod
     def of(
@@ -65,7 +71,7 @@ class Unknowns:
             unlike[first : first + width] = options.new_tool or number is None
         tool = ~frame
         tool[: len(names)] = False
-        return cls(directions, names, std, (frame | unlike) & (std > 0.0), frame, tool, known)
+        return cls(directions, names, std, (frame | unlike) & (std > 0.0), frame, tool, known, Nothing(arm))
 
     @property
     def arm(self) -> Mask:
@@ -82,6 +88,13 @@ class Unknowns:
         """Which are of the base (u,), a row of the arm where the world is known."""
         found = np.zeros(len(self.std), dtype=np.bool_)
         found[: len(self.arm_names)] = [name.startswith(BASE) for name in self.arm_names]
+        return found
+
+    @property
+    def caused(self) -> Mask:
+        """Which are of what else is asked for (u,)."""
+        found, last = np.zeros(len(self.std), dtype=np.bool_), len(self.arm_names)
+        found[last - len(self.cause.std) : last] = True
         return found
 
     @property
@@ -103,7 +116,7 @@ class Unknowns:
     def count_compared(self) -> int:
         """How many joints, bases, frames and tools are compared, at least one."""
         whole = np.arange(len(self.std))
-        parts = [*whole[self.arm & ~self.base][:, None], whole[self.base]]
+        parts = [*whole[self.arm & ~self.base & ~self.caused][:, None], whole[self.base]]
         for number in range(len(self.known)):
             own = whole[self.group(number)]
             parts += [own[self.frame[own]], own[self.tool[own]]]
@@ -114,6 +127,21 @@ class Unknowns:
         std = self.std.copy()
         std[list(numbers)] = 0.0
         return replace(self, std=std)
+
+    def beside(self, cause: Cause) -> "Unknowns":
+        """The same, with what else is asked for, where that was nothing."""
+        count, last = len(cause.std), len(self.arm_names)
+        place = [last] * count
+        return replace(
+            self,
+            directions=np.hstack([self.directions, cause.kept]),
+            arm_names=(*self.arm_names, *[cause.name] * count),
+            std=np.insert(self.std, place, cause.std),
+            anew=np.insert(self.anew, place, False),
+            frame=np.insert(self.frame, place, False),
+            tool=np.insert(self.tool, place, False),
+            cause=cause,
+        )
 
     def group(self, number: int) -> slice:
         """Where the unknowns of a set-up stand."""
@@ -146,12 +174,6 @@ def _known(calibration: Calibration, task: Task, data: Measurements) -> tuple[in
         None if number is None or (now[k] & ~then[number]).any() else number
         for k, number in enumerate(numbers)
     )
-
-
-def offset_columns(arm: IdentifiedArm) -> list[int]:
-    """The parameter of each moving joint that its reading is added to, among the chain's (5 L)."""
-    rows = [row for row, kind in enumerate(arm.joints) if kind != "fixed"]
-    return [KIND_COUNT * row + (D if arm.joints[row] == "prismatic" else THETA) for row in rows]
 
 
 def arm_directions(arm: IdentifiedArm) -> tuple[Floats, tuple[str, ...]]:

@@ -107,7 +107,8 @@ def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, c
     model = ArmModel(np.ascontiguousarray(constants), old.setup, old.field, old.scheme)
     if name == calibration.model_name:
         return replace(model, setup=found.state.setup)
-    return replace(model, setup=setup_of(model, scene, scene.data))
+    passing = scene.in_passing(np.zeros_like(found.state.arm) if name == NOMINAL else found.state.arm)
+    return replace(model, setup=setup_of(model, scene, passing))
 
 
 def _constant(calibration: Calibration, scene: Scene, errors: Carried) -> ConstantDetails:

@@ -11,7 +11,7 @@ from truearm.fits.fitting import fit_setup
 from truearm.fits.models import NOMINAL, ArmModel
 from truearm.judgement.judging import model_inputs
 from truearm.judgement.validation import RowErrors, at_first_measured, row_errors
-from truearm.measurements import Measurements
+from truearm.types import Floats, Mask
 from truearm.updating.estimating import Estimate, folds, left_out
 from truearm.updating.scene import Scene
 
@@ -55,9 +55,9 @@ def _others(name: str, model: ArmModel, scene: Scene, found: Estimate) -> RowErr
             change = found.state.arm + step[: len(change)]
         constants = model.constants + (unknowns.directions @ change).reshape(-1, 5)
         shifted = ArmModel(np.ascontiguousarray(constants), model.setup, model.field, model.scheme)
-        rest, judged = (data.select(rows) for rows in (~out, out))
-        setup = setup_of(shifted, scene, rest)
-        at = shifted.parameters(model_inputs(task.arm, judged, task.options.features))
+        passing, judged = scene.in_passing(change), data.select(out)
+        setup = setup_of(shifted, scene, passing, ~out)
+        at = shifted.parameters(model_inputs(task.arm, judged, task.options.features)) + passing[out]
         missed = row_errors(task.arm, judged, task.selection, task.groups, at, setup)
         position[out] = missed.position
         if missed.orientation is not None:
@@ -65,8 +65,11 @@ def _others(name: str, model: ArmModel, scene: Scene, found: Estimate) -> RowErr
     return RowErrors(position, turned if task.selection.orientation else None)
 
 
-def setup_of(model: ArmModel, scene: Scene, data: Measurements) -> Setup:
-    """Frames and tools of a model that rows of an update find."""
-    task = scene.task
-    at = model.parameters(model_inputs(task.arm, data, task.options.features))
+def setup_of(model: ArmModel, scene: Scene, passing: Floats, rows: Mask | slice = slice(None)) -> Setup:
+    """Frames and tools of a model that some rows of an update find, all without an argument.
+
+    `passing` is how parameters (n, L, 5) of all rows differ by what is no constant.
+    """
+    task, data = scene.task, scene.data.select(rows)
+    at = model.parameters(model_inputs(task.arm, data, task.options.features)) + passing[rows]
     return fit_setup(task, data, at).setup
