@@ -177,7 +177,7 @@ def _meanings(table: RawTable, named: Mapping[str, str], plan: ImportPlan) -> Me
         single=tuple(
             name
             for ours, name in theirs.items()
-            if any(one.fullmatch(ours) for one in (SIGMA_COLUMN, DISTANCE_COLUMN))
+            if ours == TURN or any(one.fullmatch(ours) for one in (*SIGMA_COLUMNS, DISTANCE_COLUMN))
         ),
         kept=tuple(name for name in kept if name != key),
     )
