@@ -26,7 +26,6 @@ from truearm.tables.columns import (
     DISTANCE_COLUMN,
     QUATERNION,
     SIGMA_COLUMNS,
-    SIGMA_OF_TURN,
     TARGET_COLUMN,
     WORDS,
     MissingColumnError,
@@ -34,6 +33,7 @@ from truearm.tables.columns import (
 )
 from truearm.tables.measured_fields import read_fields
 from truearm.tables.missing_numbers import Meanings, without_numbers
+from truearm.tables.our_columns import TURN, UNITS, is_ours, order, without_unit
 from truearm.tables.raw_tables import Marks, RawTable, read_raw
 from truearm.tables.reading import as_number, table_from_frame
 from truearm.tables.rotation_columns import RotationColumns
@@ -47,11 +47,8 @@ from truearm.units import (
     unit_in_header,
 )
 
-UNITS: Final = COLUMN_LENGTH_UNITS + COLUMN_ANGLE_UNITS
 WHICH: Final = "target"
 """Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
-TURN: Final = "sigma_rad"
-"""The sigma of an orientation, as it is written."""
 POINT: Final = ("x", "y", "z")
 MOST_TARGETS: Final = 100
 AGREE: Final = "The name of a column, a unit below it and the one that is stated for it must agree"
@@ -273,12 +270,12 @@ def _all_columns(table: RawTable, plan: ImportPlan) -> dict[str, str]:
     named = dict(plan.columns)
     found: dict[str, list[str]] = {}
     for name, part in table.parts.items():
-        ours, unit = _without_unit(part.name)
-        if name not in taken and _is_ours(ours) and ours not in named:
+        ours, unit = without_unit(part.name)
+        if name not in taken and is_ours(ours) and ours not in named:
             found.setdefault(ours, []).append(f"{name}:{unit}" if unit else name)
     _refuse_several(table, found)
     named |= {ours: theirs[0] for ours, theirs in found.items()}
-    return dict(sorted(named.items(), key=lambda item: _order(item[0])))
+    return dict(sorted(named.items(), key=lambda item: order(item[0])))
 
 
 def _refuse_several(table: RawTable, found: Mapping[str, Sequence[str]]) -> None:
@@ -410,7 +407,7 @@ def _orientation(table: RawTable, rotation: RotationColumns) -> dict[str, Floats
 
 
 def _kept(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
-    if _is_ours(ours):
+    if is_ours(ours):
         raise UsageError(f'"{ours}" is a measurement column', where="--keep", way_out="Give it with --map")
     name, unit = _split_unit(table, theirs)
     if unit:
@@ -466,43 +463,12 @@ def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
 
 
 def _check_is_ours(ours: str) -> None:
-    if _is_ours(ours) or ours == WHICH:
+    if is_ours(ours) or ours == WHICH:
         return
-    bare, unit = _without_unit(ours)
+    bare, unit = without_unit(ours)
     known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "sigma_x", TURN, "distance", WHICH, *WORDS]
     rule = did_you_mean(ours, known) or f"Known are {list_names(known)} and their like"
     way_out = "Further columns are kept with --keep"
     if unit:
         rule, way_out = "Units stand behind their column", f"Write --map {bare}=COLUMN:{unit}"
     raise UsageError(f'"{ours}" is no measurement column', where="--map", rule=rule, way_out=way_out)
-
-
-def _without_unit(name: str) -> tuple[str, str]:
-    """One of our names without the unit at its end, and that; any other name as it is, and "".
-
-    Sigmas of orientations are told from those of positions by their unit: they keep that in which they are
-    written.
-    """
-    turned = SIGMA_OF_TURN.fullmatch(name)
-    if turned:
-        return TURN, turned[1]
-    bare, _, unit = name.rpartition("_")
-    return (bare, unit) if unit in UNITS and _is_ours(bare) else (name, "")
-
-
-def _is_ours(name: str) -> bool:
-    """Whether a name, without unit, is one of a measurement column."""
-    patterns = (JOINT, TARGET_COLUMN, *SIGMA_COLUMNS, DISTANCE_COLUMN)
-    has_unit = any(name.endswith(f"_{unit}") for unit in UNITS)
-    is_plain = not has_unit and any(pattern.fullmatch(name) for pattern in patterns)
-    return is_plain or name in (*QUATERNION, *WORDS, TURN)
-
-
-def _order(ours: str) -> tuple[int, int, str]:
-    """Joints, targets, quaternion, then the rest."""
-    joint, target = JOINT.fullmatch(ours), TARGET_COLUMN.fullmatch(ours)
-    if joint:
-        return 0, int(joint[1]), ""
-    if target:
-        return 1 if not target[2] else 3, int(target[2] or 1), target[1]
-    return (2, QUATERNION.index(ours), "") if ours in QUATERNION else (4, 0, ours)

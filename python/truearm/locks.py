@@ -1,7 +1,9 @@
 """Locks that one process of this user on this machine holds at a time, whatever each calls what is locked."""
 
 import os
+import stat
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote_from_bytes
@@ -39,8 +41,25 @@ def held(name: str, doing: str, *, where: str, wait_s: float = 0.0) -> FileLock:
 
 
 def _folder() -> Path:
-    """Where the locks of this user are."""
-    is_usable = os.name == "posix" and os.access(FIXED, os.W_OK | os.X_OK)
-    folder = (FIXED if is_usable else Path(tempfile.gettempdir())) / f"truearm-{ME}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    return folder
+    """Where the locks of this user are: the same for all processes, whatever they call temporary.
+
+    Raises:
+        OSError: If there is no such folder, and none can be made.
+    """
+    if os.name != "posix":
+        folder = Path(tempfile.gettempdir()) / "truearm"
+        folder.mkdir(exist_ok=True)
+        return folder
+    places = (FIXED / f"truearm-{ME}", Path("/run/user", ME, "truearm"))
+    for folder in places:
+        with suppress(OSError):
+            folder.mkdir(mode=0o700, exist_ok=True)
+            if _is_mine(folder):
+                return folder
+    raise PermissionError(f"no folder for locks: make {places[0]} one that is yours alone (chmod 700)")
+
+
+def _is_mine(folder: Path) -> bool:
+    """Whether nobody else can write into a folder."""
+    state = folder.lstat()
+    return stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o022

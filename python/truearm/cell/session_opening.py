@@ -61,8 +61,8 @@ def told_lost_log(path: Path, head: bytes) -> list[Notice]:
         Notice(
             "no_log",
             f"{path} was not closed by what measured into it, as after a kill or a loss of power, and "
-            f"{log.name} is not beside it: what was stored last may be missing. Copy both from where it was "
-            "measured.",
+            f"{log.name} is not beside it: what was stored last may be missing, unless another program has "
+            "taken it into the file. Copy both from where it was measured.",
         )
     ]
 

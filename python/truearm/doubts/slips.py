@@ -34,6 +34,8 @@ from truearm.robot import Robot
 from truearm.types import AXES, Floats, Mask, Rows
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
+HOTTEST_K: Final = 50.0
+"""Nobody measures an arm that is warmer or colder by more."""
 KINDS: Final = {TARGET: TARGET_SLIPPED, JOINT: JOINT_MOVED, FRAME: SETUP_TURNED, SCALE: SCALE_DIFFERS}
 OF_ONE_ARM: Final = (JOINT_MOVED, SCALE_DIFFERS)
 """Kinds of what one set-up shows against others, and these against it."""
@@ -223,6 +225,9 @@ def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Itera
     group, width = fitted.data.group[seen.rows], seen.left.shape[1]
     pull, alone = seen.root.T @ seen.left.ravel(), seen.precision
     metric = alone - seen.root.T @ seen.taken @ seen.root
+    # What is left open of frames and targets, as heights on a SCARA, turns small tilts into a scale.
+    of_setups = found.identifiability.total_rank - found.identifiability.rank
+    is_open = of_setups < len(found.groups) * seen.setup.shape[-1]
     for name in found.groups:
         own, values = group == name, np.flatnonzero(np.repeat(group == name, width))
         count = len(values)
@@ -234,7 +239,8 @@ def sessions_of(found: Calibration, fitted: FittedRows, seen: Whitened) -> Itera
         setup, joints = (each.reshape(count, -1) for each in (seen.setup[own], by_readings))
         points = np.ones(count, dtype=np.bool_)
         frame, targets = found.arm.frame_unknowns, found.selection.targets
-        by = Derivatives(setup, joints, points, frame, targets, seen.scaled[own].ravel())
+        scaled = None if is_open else seen.scaled[own].ravel()
+        by = Derivatives(setup, joints, points, frame, targets, scaled)
         yield Session(found.robot, fitted.data, seen.rows[own], left, by, len(found.groups) > 1)
 
 
@@ -307,12 +313,18 @@ def _of_scale(step: Step, far: str) -> str:
     """How much longer or shorter all lengths are, of what, and what to do."""
     size = abs(float(step.sizes[0]))
     longer, warmer = ("longer", "warmer") if step.sizes[0] > 0.0 else ("shorter", "colder")
-    kelvin = " or ".join(f"{size / growth:.2g} K ({material})" for material, growth in PER_KELVIN.items())
+    kelvin = {material: size / growth for material, growth in PER_KELVIN.items()}
+    heat = "."
+    if min(kelvin.values()) < HOTTEST_K:
+        how = " or ".join(f"{_rounded(each)} K ({material})" for material, each in kelvin.items())
+        heat = (
+            f", or an arm that is {warmer} by {how}: note its temperature in a column and calibrate with "
+            "--features, or from rows of one temperature alone."
+        )
     return (
         f"all lengths are {longer} by {_rounded(PARTS_PER_MILLION * size)} ppm: points by {far} on average "
         "about their middle. That is an instrument of another scale (measure one known distance with each, "
-        f"and put the coordinates of that which is off right), or an arm that is {warmer} by {kelvin}: note "
-        "its temperature in a column and calibrate with --features, or from rows of one temperature alone."
+        f"and put the coordinates of that which is off right){heat}"
     )
 
 
