@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from tests.program_tools import Bend, read, reasons, rewritten
+from tests.program_tools import Bend, Shift, read, reasons, rewritten
 from tests.programs_rig import ABB, KUKA
 from tests.test_programs_krl import pose_text as krl_pose
 from tests.test_programs_melfa import MELFA, flags
 from tests.test_programs_tp import TP, pose, program
 from tests.test_programs_urscript import UR, pose_text
+from truearm.controller import Controller
 from truearm.inverse import Inverse
 from truearm.programs.arcs import Arc
 from truearm.programs.densify import Spacing
@@ -19,6 +20,7 @@ from truearm.programs.following import UNFOLLOWED
 from truearm.programs.krl import KRL
 from truearm.programs.program import numbers_of
 from truearm.programs.rapid import RAPID
+from truearm.programs.rewriting import Choices, Models, rewrite
 from truearm.programs.tables import Motion
 from truearm.programs.vias import ENDS_UNKNOWN, NO_ARC, PASSED
 from truearm.robot import Robot
@@ -193,6 +195,21 @@ def test_a_via_point_in_joints_says_the_position_of_its_correction():
     np.testing.assert_allclose(tool[:3, 3], posed[1, :3, 3], atol=1e-8)
 
 
+def test_a_program_of_joints_alone_keeps_its_numbers_and_how_its_via_point_is_turned():
+    arc = arc_of(UNIVERSAL, np.array(DIALECTS["UR"][3]))
+    start, via, end = (f"[{', '.join(f'{value:.12f}' for value in q)}]" for q in arc.q)
+    text = f"def a():\n  set_tcp(p[0.08, 0.05, 0.15, 0, 0, 0])\n  movej({start})\n  movec({via}, {end})\nend\n"
+    found = read(UR, text, UNIVERSAL)
+    stated = np.array(found.targets.values)
+    kept, done = with_choices(found, UNIVERSAL, 0.0), with_choices(found, UNIVERSAL, BY)
+    np.testing.assert_array_equal(found.targets.values, stated)
+    unmoved = read(UR, kept.contents[0], UNIVERSAL).targets.values
+    np.testing.assert_allclose(unmoved, stated, atol=1e-9, err_msg="nothing to correct, nothing changes")
+    tools = flange(UNIVERSAL, read(UR, done.contents[0], UNIVERSAL).targets.values.reshape(3, 6)) @ TOOL
+    np.testing.assert_allclose(tools[1, :3, :3], arc.tools[1, :3, :3], atol=1e-9, err_msg="turned as before")
+    assert np.linalg.norm(true_via(tools, arc) - arc.passed[:3, 3]) < 3e-6
+
+
 @pytest.mark.parametrize(("tilt", "changed"), [(np.eye(3), True), (TILT, False)])
 @pytest.mark.parametrize("name", ["p2", "Offs(p2,0,0,0.5)"])
 def test_a_via_point_that_a_motion_ends_at_too_suits_both_only_as_the_arc_passes_it(tilt, changed, name):
@@ -226,13 +243,13 @@ def test_an_arc_that_is_used_again_with_an_offset_is_changed_for_both():
     assert 1e3 * np.linalg.norm(off) == pytest.approx(done.offset_mm[1], abs=0.005)
 
 
-def with_offsets(found):
-    from tests.program_tools import Shift
-    from truearm.controller import Controller
-    from truearm.programs.rewriting import Choices, Models, rewrite
+def with_offsets(found, offsets_mm=0.5):
+    return with_choices(found, ABB, BY, offsets_mm=offsets_mm)
 
-    controller = Controller.nominal(ABB)
-    return rewrite(found, Models(ABB, controller.inverse, controller, Shift(BY)), Choices(offsets_mm=0.5))
+
+def with_choices(found, robot, by, **choices):
+    controller = Controller.nominal(robot)
+    return rewrite(found, Models(robot, controller.inverse, controller, Shift(by)), Choices(**choices))
 
 
 def test_two_arcs_that_pass_a_via_point_turned_otherwise_leave_it():
