@@ -198,7 +198,9 @@ def test_a_via_point_in_joints_says_the_position_of_its_correction():
 def test_a_program_of_joints_alone_keeps_its_numbers_and_how_its_via_point_is_turned():
     arc = arc_of(UNIVERSAL, np.array(DIALECTS["UR"][3]))
     start, via, end = (f"[{', '.join(f'{value:.12f}' for value in q)}]" for q in arc.q)
-    text = f"def a():\n  set_tcp(p[0.08, 0.05, 0.15, 0, 0, 0])\n  movej({start})\n  movec({via}, {end})\nend\n"
+    text = (
+        f"def a():\n  set_tcp(p[0.08, 0.05, 0.15, 0, 0, 0])\n  movej({start})\n  movec({via}, {end})\nend\n"
+    )
     found = read(UR, text, UNIVERSAL)
     stated = np.array(found.targets.values)
     kept, done = with_choices(found, UNIVERSAL, 0.0), with_choices(found, UNIVERSAL, BY)
@@ -359,6 +361,36 @@ def test_a_whole_circle_keeps_the_tool_turned_as_at_its_start():
     assert reasons(done) == []
     turned = (flange(MITSUBISHI, done.nominal) @ TOOL)[:, :3, :3]
     np.testing.assert_allclose(turned[1:], turned[[0, 0]], atol=1e-5)
+
+
+@pytest.mark.parametrize("motion", ["Mvr P1,P2,P3", "Mvc P1,P2,P3"])
+@pytest.mark.parametrize("given", ["1", "1,0", "0,1", "0, 2", "M1,0"])
+def test_via_points_that_the_tool_does_not_pass_evenly_turned_the_short_way_are_left(motion, given):
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3], np.eye(3))
+    text = of_melfa(arc, ("Mov P1", f"{motion} Type {given} Wth M_Out(1)=0"))
+    done = rewritten(MELFA, text, MITSUBISHI, by=BY)
+    reason = (
+        f"it is a via point in line 3 with Type {given}, where the tool turns the long way round or as axes "
+        "4 to 6 take it, which is not followed: to have it corrected, use Type 0,0"
+    )
+    vias = ["P2"] if motion.startswith("Mvr") else ["P2", "P3"]
+    assert [(name, why) for _, name, why in reasons(done)] == [(name, reason) for name in vias]
+
+
+@pytest.mark.parametrize("given", ["0", "0,0", "0 , 0 Wth M_Out(1)=0"])
+def test_via_points_that_the_tool_passes_evenly_turned_the_short_way_are_changed(given):
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3])
+    done = rewritten(MELFA, of_melfa(arc, ("Mov P1", f"Mvr P1,P2,P3 Type {given}")), MITSUBISHI, by=BY)
+    assert reasons(done) == []
+    written = said(MELFA, done.contents[0], MITSUBISHI)
+    assert np.linalg.norm(true_via(written, arc) - arc.passed[:3, 3]) < 3e-6
+
+
+def test_arcs_on_which_the_tool_turns_otherwise_may_deviate():
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3], np.eye(3))
+    text = of_melfa(arc, ("Mov P1", "Mvr P1,P2,P3 Type 0,1"))
+    (one,) = rewritten(MELFA, text, MITSUBISHI, by=Bend(), spacing=Spacing.of(0.001, 5.0)).deviating
+    assert one.deviation_mm is None
 
 
 @pytest.mark.parametrize("angle_deg", [60.0, 180.0, 230.0])
