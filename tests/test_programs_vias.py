@@ -245,6 +245,23 @@ def test_an_arc_that_is_used_again_with_an_offset_is_changed_for_both():
     assert 1e3 * np.linalg.norm(off) == pytest.approx(done.offset_mm[1], abs=0.005)
 
 
+@pytest.mark.parametrize(("tilt", "offset_mm"), [(np.eye(3), 20.0), (TILT, 20.0), (TILT, 1.0)])
+def test_how_far_a_via_point_is_off_with_an_offset_is_told_as_it_is_written(tilt, offset_mm):
+    """An offset along the tool goes where the via point states that the tool points, not where it does."""
+    arc = arc_of(ABB, DIALECTS["RAPID"][3], tilt)
+    names = [f"RelTool(p{number},0,0,{-offset_mm})" for number in (1, 2, 3)]
+    upper = [f"MoveJ {names[0]},{GO}", f"MoveC {names[1]},{names[2]},{GO}"]
+    body = [f"MoveJ p1,{GO}", f"MoveC p2,p3,{GO}", *upper]
+    done = with_offsets(read(RAPID(), of_rapid(arc, body), ABB))
+    assert reasons(done) == []
+    along = np.eye(4)
+    along[2, 3] = -1e-3 * offset_mm
+    raised, written = arc.tools @ along, said(RAPID(), done.contents[0], ABB) @ along
+    reached = true_via(written, SimpleNamespace(robot=ABB, q=near(ABB, raised, arc.q[0])))
+    off_mm = 1e3 * np.linalg.norm(reached - raised[1, :3, 3])
+    assert off_mm == pytest.approx(done.offset_mm[1], abs=0.005)
+
+
 def with_offsets(found, offsets_mm=0.5):
     return with_choices(found, ABB, BY, offsets_mm=offsets_mm)
 
