@@ -260,6 +260,9 @@ def test_how_far_a_via_point_is_off_with_an_offset_is_told_as_it_is_written(tilt
     reached = true_via(written, SimpleNamespace(robot=ABB, q=near(ABB, raised, arc.q[0])))
     off_mm = 1e3 * np.linalg.norm(reached - raised[1, :3, 3])
     assert off_mm == pytest.approx(done.offset_mm[1], abs=0.005)
+    elsewhere = "[tool.tG]\nxyz = [90.0, 45.0, 158.0]\n"
+    moved = with_offsets(read(RAPID(), of_rapid(arc, body), ABB, elsewhere))
+    assert moved.offset_mm[1] == pytest.approx(done.offset_mm[1]), "a tool turned alike is off alike"
 
 
 def with_offsets(found, offsets_mm=0.5):
