@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from tests.program_tools import Bend, read, reasons, rewritten
+from tests.program_tools import Bend, Shift, read, reasons, rewritten
 from tests.programs_rig import ABB, KUKA
 from tests.test_programs_krl import pose_text as krl_pose
 from tests.test_programs_melfa import MELFA, flags
 from tests.test_programs_tp import TP, pose, program
 from tests.test_programs_urscript import UR, pose_text
+from truearm.controller import Controller
 from truearm.inverse import Inverse
 from truearm.programs.arcs import Arc
 from truearm.programs.densify import Spacing
@@ -19,6 +20,7 @@ from truearm.programs.following import UNFOLLOWED
 from truearm.programs.krl import KRL
 from truearm.programs.program import numbers_of
 from truearm.programs.rapid import RAPID
+from truearm.programs.rewriting import Choices, Models, rewrite
 from truearm.programs.tables import Motion
 from truearm.programs.vias import ENDS_UNKNOWN, NO_ARC, PASSED
 from truearm.robot import Robot
@@ -193,6 +195,23 @@ def test_a_via_point_in_joints_says_the_position_of_its_correction():
     np.testing.assert_allclose(tool[:3, 3], posed[1, :3, 3], atol=1e-8)
 
 
+def test_a_program_of_joints_alone_keeps_its_numbers_and_how_its_via_point_is_turned():
+    arc = arc_of(UNIVERSAL, np.array(DIALECTS["UR"][3]))
+    start, via, end = (f"[{', '.join(f'{value:.12f}' for value in q)}]" for q in arc.q)
+    text = (
+        f"def a():\n  set_tcp(p[0.08, 0.05, 0.15, 0, 0, 0])\n  movej({start})\n  movec({via}, {end})\nend\n"
+    )
+    found = read(UR, text, UNIVERSAL)
+    stated = np.array(found.targets.values)
+    kept, done = with_choices(found, UNIVERSAL, 0.0), with_choices(found, UNIVERSAL, BY)
+    np.testing.assert_array_equal(found.targets.values, stated)
+    unmoved = read(UR, kept.contents[0], UNIVERSAL).targets.values
+    np.testing.assert_allclose(unmoved, stated, atol=1e-9, err_msg="nothing to correct, nothing changes")
+    tools = flange(UNIVERSAL, read(UR, done.contents[0], UNIVERSAL).targets.values.reshape(3, 6)) @ TOOL
+    np.testing.assert_allclose(tools[1, :3, :3], arc.tools[1, :3, :3], atol=1e-9, err_msg="turned as before")
+    assert np.linalg.norm(true_via(tools, arc) - arc.passed[:3, 3]) < 3e-6
+
+
 @pytest.mark.parametrize(("tilt", "changed"), [(np.eye(3), True), (TILT, False)])
 @pytest.mark.parametrize("name", ["p2", "Offs(p2,0,0,0.5)"])
 def test_a_via_point_that_a_motion_ends_at_too_suits_both_only_as_the_arc_passes_it(tilt, changed, name):
@@ -226,13 +245,33 @@ def test_an_arc_that_is_used_again_with_an_offset_is_changed_for_both():
     assert 1e3 * np.linalg.norm(off) == pytest.approx(done.offset_mm[1], abs=0.005)
 
 
-def with_offsets(found):
-    from tests.program_tools import Shift
-    from truearm.controller import Controller
-    from truearm.programs.rewriting import Choices, Models, rewrite
+@pytest.mark.parametrize(("tilt", "offset_mm"), [(np.eye(3), 20.0), (TILT, 20.0), (TILT, 1.0)])
+def test_how_far_a_via_point_is_off_with_an_offset_is_told_as_it_is_written(tilt, offset_mm):
+    """An offset along the tool goes where the via point states that the tool points, not where it does."""
+    arc = arc_of(ABB, DIALECTS["RAPID"][3], tilt)
+    names = [f"RelTool(p{number},0,0,{-offset_mm})" for number in (1, 2, 3)]
+    upper = [f"MoveJ {names[0]},{GO}", f"MoveC {names[1]},{names[2]},{GO}"]
+    body = [f"MoveJ p1,{GO}", f"MoveC p2,p3,{GO}", *upper]
+    done = with_offsets(read(RAPID(), of_rapid(arc, body), ABB))
+    assert reasons(done) == []
+    along = np.eye(4)
+    along[2, 3] = -1e-3 * offset_mm
+    raised, written = arc.tools @ along, said(RAPID(), done.contents[0], ABB) @ along
+    reached = true_via(written, SimpleNamespace(robot=ABB, q=near(ABB, raised, arc.q[0])))
+    off_mm = 1e3 * np.linalg.norm(reached - raised[1, :3, 3])
+    assert off_mm == pytest.approx(done.offset_mm[1], abs=0.005)
+    elsewhere = "[tool.tG]\nxyz = [90.0, 45.0, 158.0]\n"
+    moved = with_offsets(read(RAPID(), of_rapid(arc, body), ABB, elsewhere))
+    assert moved.offset_mm[1] == pytest.approx(done.offset_mm[1]), "a tool turned alike is off alike"
 
-    controller = Controller.nominal(ABB)
-    return rewrite(found, Models(ABB, controller.inverse, controller, Shift(BY)), Choices(offsets_mm=0.5))
+
+def with_offsets(found, offsets_mm=0.5):
+    return with_choices(found, ABB, BY, offsets_mm=offsets_mm)
+
+
+def with_choices(found, robot, by, **choices):
+    controller = Controller.nominal(robot)
+    return rewrite(found, Models(robot, controller.inverse, controller, Shift(by)), Choices(**choices))
 
 
 def test_two_arcs_that_pass_a_via_point_turned_otherwise_leave_it():
@@ -342,6 +381,36 @@ def test_a_whole_circle_keeps_the_tool_turned_as_at_its_start():
     assert reasons(done) == []
     turned = (flange(MITSUBISHI, done.nominal) @ TOOL)[:, :3, :3]
     np.testing.assert_allclose(turned[1:], turned[[0, 0]], atol=1e-5)
+
+
+@pytest.mark.parametrize("motion", ["Mvr P1,P2,P3", "Mvc P1,P2,P3"])
+@pytest.mark.parametrize("given", ["1", "1,0", "0,1", "0, 2", "M1,0"])
+def test_via_points_that_the_tool_does_not_pass_evenly_turned_the_short_way_are_left(motion, given):
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3], np.eye(3))
+    text = of_melfa(arc, ("Mov P1", f"{motion} Type {given} Wth M_Out(1)=0"))
+    done = rewritten(MELFA, text, MITSUBISHI, by=BY)
+    reason = (
+        f"it is a via point in line 3 with Type {given}, where the tool turns the long way round or as axes "
+        "4 to 6 take it, which is not followed: to have it corrected, use Type 0,0"
+    )
+    vias = ["P2"] if motion.startswith("Mvr") else ["P2", "P3"]
+    assert [(name, why) for _, name, why in reasons(done)] == [(name, reason) for name in vias]
+
+
+@pytest.mark.parametrize("given", ["0", "0,0", "0 , 0 Wth M_Out(1)=0"])
+def test_via_points_that_the_tool_passes_evenly_turned_the_short_way_are_changed(given):
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3])
+    done = rewritten(MELFA, of_melfa(arc, ("Mov P1", f"Mvr P1,P2,P3 Type {given}")), MITSUBISHI, by=BY)
+    assert reasons(done) == []
+    written = said(MELFA, done.contents[0], MITSUBISHI)
+    assert np.linalg.norm(true_via(written, arc) - arc.passed[:3, 3]) < 3e-6
+
+
+def test_arcs_on_which_the_tool_turns_otherwise_may_deviate():
+    arc = arc_of(MITSUBISHI, DIALECTS["MELFA"][3], np.eye(3))
+    text = of_melfa(arc, ("Mov P1", "Mvr P1,P2,P3 Type 0,1"))
+    (one,) = rewritten(MELFA, text, MITSUBISHI, by=Bend(), spacing=Spacing.of(0.001, 5.0)).deviating
+    assert one.deviation_mm is None
 
 
 @pytest.mark.parametrize("angle_deg", [60.0, 180.0, 230.0])

@@ -34,7 +34,10 @@ UNREACHED: Final = "the nominal arm does not reach all of the way"
 SINGULAR: Final = "the way leads too near to a singularity"
 ELSEWHERE: Final = "the way does not arrive at the readings of its target, which are of another configuration"
 ARC: Final = "an arc gets no waypoints: it deviates less in several shorter ones"
-NO_ARC: Final = "how far its arc deviates is followed only of arcs past a via point that end at their target"
+NO_ARC: Final = (
+    "how far its arc deviates is followed only of arcs past a via point that end at their target, the tool "
+    "turning evenly"
+)
 BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
 NO_ROOM: Final = "what blends it with its neighbours leaves no room for waypoints"
 OFFSET: Final = "its target has an offset, which a waypoint would not have"

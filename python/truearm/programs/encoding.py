@@ -12,12 +12,11 @@ from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
-from truearm.programs.program import Program, flange_poses_of, numbers_of
+from truearm.programs.program import Program, numbers_of, turned_as_stated
 from truearm.programs.solving import AT_ONCE, Solved, are_singular
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
 from truearm.turns import with_turns
 from truearm.types import Floats, Integers
 from truearm.units import MM_PER_METRE
@@ -112,11 +111,8 @@ class Encoder:
         self, which: Integers, layout: JointLayout | PoseLayout, environment: Environment, q: Floats
     ) -> None:
         """Targets of which only the position counts say where the tool is at q^c, turned as they state."""
-        stated = flange_poses_of(self.program, which, self.uses.environment[which], self.robot)
-        tool = environment.tool.controller
-        tools = self._flange(q) @ tool
-        tools[:, :3, :3] = (stated @ tool)[:, :3, :3]
-        flange = tools @ rigid_inverse(tool)
+        number = int(self.uses.environment[which[0]])
+        flange = turned_as_stated(self.program, which, number, self._flange(q), self.robot)
         near = numbers_of(self.program, which, layout)
         if of_joints(layout):
             said, steady = joints_of(self.robot, flange, layout.to_readings(near))

@@ -22,7 +22,7 @@ from truearm.programs.melfa_text import (
 )
 from truearm.programs.melfa_variables import COMBINED, FLAGS, SETTING, Variable, Variables
 from truearm.programs.source import Source
-from truearm.programs.tables import ABSENT, Motion
+from truearm.programs.tables import ABSENT, Motion, Via
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 from truearm.types import Transform
@@ -63,6 +63,9 @@ _CORRECTED: Final = "1"
 """Number of the mechanism that is corrected: the arm itself, which a program has from the start."""
 _SET_BY: Final[Mapping[Kind, tuple[str, ...]]] = {"tool": ("tool", "m_tool"), "base": ("base",)}
 _NUMBERED: Final = "M_Tool="
+_TYPE: Final = re.compile(r"Type\b\s*(.*?)\s*(?:Wth(?:If)?\b|\Z)", re.IGNORECASE | re.DOTALL)
+_EVENLY: Final = re.compile(r"0?(?:\s*,\s*0?)?")
+"""Constants of Type with which the tool turns evenly about one axis, the short way; so it does without."""
 _SKIPPED: Final = re.compile(r"(?<![\w.])Skip\b", re.IGNORECASE)
 COMPUTED: Final = "its target is computed when the program runs"
 RELATIVE: Final = "it is a relative move"
@@ -73,6 +76,10 @@ OF_ANOTHER: Final = (
 ABOUT_CENTRE: Final = (
     "it is used in line {line} by Mvr3, whose start and end have to be equally far from its centre, within "
     "0.01 mm: to have it corrected, use Mvr with a point of the arc"
+)
+TURNED_OTHERWISE: Final = (
+    "it is a via point in line {line} with Type {given}, where the tool turns the long way round or as axes "
+    "4 to 6 take it, which is not followed: to have it corrected, use Type 0,0"
 )
 NOT_CONSTANT: Final = "its target is not a constant of this file"
 
@@ -261,7 +268,7 @@ class Reader:
             self._keep(move.pieces, f"it is also used in line {line} by {move.word}, which is not followed")
             self._follows = False
             return
-        kinds = _KINDS[word]
+        kinds, otherwise = _KINDS[word], self._keep_vias(move)
         count = 1 + max(piece for piece, _ in kinds)
         pieces, behind = move.pieces[:count], move.pieces[count:]
         self._keep(behind, f"a distance is computed from it in line {line} when the program runs")
@@ -280,6 +287,8 @@ class Reader:
                 continue
             target, before, after = found
             environment = self._environment(place, before, after @ offset, problem)
+            if kind == Motion.VIA and otherwise:
+                self.found.vias[len(self.found.moves)] = Via.OPEN
             self._go(move.at, target, kind, environment)
             self._follows = not problem and _SKIPPED.search(move.added) is None
         self._follows = self._follows and place not in self._of_others
@@ -294,6 +303,16 @@ class Reader:
             reason = ABOUT_CENTRE.format(line=line)
             self._keep(move.pieces[:2], reason)
             self._centres += [(centre, reason) for centre in move.pieces[2:3]]
+
+    def _keep_vias(self, move: Move) -> bool:
+        """Whether the tool turns on an arc otherwise than evenly the short way; its via points stay then."""
+        stated = _TYPE.match(move.added)
+        if stated is None or _EVENLY.fullmatch(stated.group(1)) is not None:
+            return False
+        reason = TURNED_OTHERWISE.format(line=self._source.place(move.at)[0], given=stated.group(1))
+        vias = [number for number, kind in _KINDS[move.word.casefold()] if kind == Motion.VIA]
+        self._keep([move.pieces[number] for number in vias if number < len(move.pieces)], reason)
+        return True
 
     def _environment(self, place: int, before: Transform, after: Transform, problem: str) -> Environment:
         tool = self._tools[place]

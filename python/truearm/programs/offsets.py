@@ -13,7 +13,7 @@ from truearm.errors import Notice, count_of
 from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
 from truearm.programs.listing import listed_target
-from truearm.programs.program import Program, numbers_of
+from truearm.programs.program import Program, numbers_of, turned_as_stated
 from truearm.programs.solving import Solved, are_singular
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
@@ -117,7 +117,7 @@ class Offsets:
                 reasons[target] = NOT_KNOWN
                 continue
             rows = np.array([target, *others.tolist()])
-            off_mm[target], off_mrad[target] = self._off(rows, q[rows], controller, whole[others])
+            off_mm[target], off_mrad[target] = self._off(rows, q[rows], controller, whole[rows])
             if off_mm[target] > largest_mm:
                 reasons[target] = (
                     f"with its correction a use with an offset would be {off_mm[target]:.3f} mm off"
@@ -130,18 +130,23 @@ class Offsets:
 
     def _off(self, rows: Integers, q: Floats, controller: Robot, whole: Mask) -> tuple[float, float]:
         """How far off the tool is at most, mm and mrad, at the last of targets `rows` (n,), if the first says
-        what readings `q` (n, N) have for it; these are all places of one stored target. How it is turned
-        counts at those that are `whole` (n - 1,).
+        what readings `q` (n, N) have for it; these are all places of one stored target. Those that are not
+        `whole` (n,) say a position alone, and are passed turned as at `q`.
         """
         flange = controller.flange_chain.pose(np.ascontiguousarray(controller.joints_from_readings(q)))
         uses = self.uses.environment[rows]
         here, *with_offsets = (self.program.environments[int(number)] for number in uses)
-        stored = here.stored_poses(flange[:1])
-        tools = flange @ here.tool.true
-        commanded = np.concatenate([one.flange_poses(stored) for one in with_offsets]) @ here.tool.true
-        far_m = np.linalg.norm(commanded[:, :3, 3] - tools[1:, :3, 3], axis=1)
-        turned = np.swapaxes(tools[1:, :3, :3], 1, 2) @ commanded[:, :3, :3]
-        turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)[whole]
+        written = flange[:1]
+        if not whole[0]:
+            written = turned_as_stated(self.program, rows[:1], int(uses[0]), written, controller)
+        stored, counting = here.stored_poses(written), whole[1:]
+        # Turned alike, a tool that is elsewhere than the controller has it is as far off as that one.
+        tool = np.where(counting[:, None, None], here.tool.true, here.tool.controller)
+        wanted = flange[1:] @ tool
+        commanded = np.concatenate([one.flange_poses(stored) for one in with_offsets]) @ tool
+        far_m = np.linalg.norm(commanded[:, :3, 3] - wanted[:, :3, 3], axis=1)
+        turned = np.swapaxes(wanted[:, :3, :3], 1, 2) @ commanded[:, :3, :3]
+        turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)[counting]
         return MM_PER_METRE * float(far_m.max()), MRAD_PER_RAD * float(turn_rad.max(initial=0.0))
 
     def _heeding(self) -> Mask:

@@ -14,6 +14,7 @@ from truearm.programs.layouts import JointLayout, Layout, PoseLayout, of_joints,
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Moves, Targets, Via, all_ones
 from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
 from truearm.types import Floats, Integers
 
 
@@ -270,4 +271,18 @@ def flange_poses_of(program: Program, which: Integers, environments: Integers, r
             elif of_pose(layout) and not used.why_not_poses:
                 stored = layout.to_poses(numbers[:, : layout.width - layout.configuration])
                 found[here] = used.flange_poses(stored)
+    return found
+
+
+def turned_as_stated(
+    program: Program, which: Integers, environment: int, flange: Floats, robot: Robot
+) -> Floats:
+    """Poses (n, 4, 4) of the flange with the tool where it is with the flange at poses `flange` (n, 4, 4),
+    but turned as targets `which` (n,) state, which are used in one environment.
+    """
+    stated = flange_poses_of(program, which, np.full(len(which), environment), robot)
+    tool = program.environments[environment].tool.controller
+    tools = flange @ tool
+    tools[:, :3, :3] = (stated @ tool)[:, :3, :3]
+    found: Floats = tools @ rigid_inverse(tool)
     return found

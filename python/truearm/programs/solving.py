@@ -202,7 +202,7 @@ class _Solver:
         moved = np.flatnonzero(moves.moving & np.isin(moves.target, list(poses)))
         if len(moved) == 0:
             return
-        self.q = np.require(self.q, requirements="W")
+        self.q = np.array(self.q)  # may be the program's own numbers, where all of them are joints
         self.q[list(points)] = np.nan
         for start in range(0, len(moved), AT_ONCE):
             tell(start, len(moved))

@@ -70,7 +70,7 @@ class Via(IntEnum):
     Attributes:
         BETWEEN: Its start and its end, evenly, whatever the via point states.
         ON_PATH: The same, evenly in a frame that goes round with the path.
-        OPEN: The same, as far as an angle goes that the arc is given.
+        OPEN: The same, but how far or which way round is not followed.
         UNTOLD: Perhaps what the via point states.
     """
 
