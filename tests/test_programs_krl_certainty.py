@@ -368,6 +368,8 @@ def inline(name):
         ("turned()", "$ORI_TYPE: a subroutine was called"),
         (f"OUTSIDE()\n{FLANGE}", "and may have set another: set $ORI_TYPE=#VAR behind it"),
         ("given($ORI_TYPE)", "$ORI_TYPE: a subroutine was called"),
+        ("giving()", "$ORI_TYPE: a subroutine was called"),
+        ("INTERRUPT DECL 5 WHEN $IN[1] DO given($ORI_TYPE)", "$ORI_TYPE: an interrupt or a trigger"),
         ("named()", "$ORI_TYPE: a subroutine was called"),
         ("$ORI_TYPE=#CONSTANT\neven()", "$ORI_TYPE: a subroutine was called"),
         ("INTERRUPT DECL 5 WHEN $IN[1] DO $ORI_TYPE=#CONSTANT", "$ORI_TYPE: an interrupt or a trigger"),
@@ -378,6 +380,7 @@ def inline(name):
 def test_orientations_that_the_controller_does_not_take_from_the_target(before, told):
     behind = "DEF turned()\n$ORI_TYPE=#CONSTANT\nEND\nDEF even()\n$ORI_TYPE=#VAR\nEND\n"
     behind += "DEF given(x:OUT)\nx=#CONSTANT\nEND\nDEF named()\n$ORI_TYPE=var\nEND\n"
+    behind += "DEF giving()\ngiven($ORI_TYPE)\nEND\n"
     src = f"{ALREADY}PTP {HERE}\n{before}\n@\nPTP {HERE}\nEND\n{behind}"
     for move in (f"LIN {THERE}", f"SLIN {THERE}", f"SPLINE\nSPL {THERE}\nENDSPLINE"):
         assert changed(src.replace("@", move), DATA) == [True, False, True]

@@ -336,6 +336,7 @@ def test_where_a_krl_program_may_turn_tools_as_seen_from_the_path_both_ways_have
 ):
     arc = wide_arc()
     way = Arc.through(arc.tools[0], [arc.tools[1]], arc.tools[2])
+    assert way is not None
     share = way.share_of(arc.tools[1, :3, 3])
     apart = Rotation.from_matrix(way.turned(share).T @ way.turned_on_path(share)).magnitude()
     found = reasons(rewritten(KRL(), f"{of_krl(arc)}{behind}".replace("PTP", f"{said}\nPTP", 1), KUKA, by=BY))

@@ -19,9 +19,7 @@ from truearm.programs.krl_routines import (
     BAS_LEAVING,
     DOING_LATER,
     EXTERNAL,
-    FRAMES,
     LEAVING,
-    ORIENTATION,
     SETTING,
     Routine,
     Routines,
@@ -79,8 +77,6 @@ OWN: Final = {
     "mode": re.compile(r"\$ipo_mode=sipo_mode\((\w+)\.ipo_frame\)"),
 }
 """Settings of a motion's own that name the frame data of an inline form."""
-GIVEN_IN: Final = {"$tool": FRAMES, "$base": FRAMES, "$ori_type": ORIENTATION}
-"""What a routine may change that is given one of these."""
 ANGLE: Final = "ca"
 """Tells how far an arc goes, which then ends elsewhere than at its target."""
 OPENING: Final = {"if": False, "switch": False, "for": True, "while": True, "loop": True, "repeat": True}
@@ -194,13 +190,10 @@ class KrlReading:
     def _calls_of(self, found: list[Token]) -> None:
         """Routines that a line calls may set tool and base, and move the arm."""
         now, later = immediate(found)
-        names = names_in(now)
         for name in called(now):
             if self._routines.local(name):
                 self._called(name)
-            changed = self._routines.changed_by(name)
-            if name not in LEAVING:
-                changed |= {GIVEN_IN[one] for one in names & GIVEN_IN.keys()}
+            changed = self._routines.changed_by(name, now)
             self._flow.state = self._flow.state.changed(changed, CALLED, BEHIND)
             if self._routines.local(name) or name not in LEAVING:
                 self._flow.jump()

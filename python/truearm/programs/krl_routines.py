@@ -123,6 +123,14 @@ SUBJECTS: Final = {FRAMES: _sets_frames, ORIENTATION: _orients} | {mode: _settin
 """What routines may leave as it is, and which statements set it."""
 
 
+GIVEN: Final = {"$tool": FRAMES, "$base": FRAMES, "$ori_type": ORIENTATION}
+
+
+def given_among(found: Sequence[Token]) -> set[str]:
+    """Which of SUBJECTS a routine may set that is given what is among tokens."""
+    return {GIVEN[word] for token in found if (word := token.text.lower()) in GIVEN}
+
+
 def set_later(later: Sequence[Token], subject: str) -> bool:
     """Whether what an interrupt or a trigger does sets a subject, which stays until it is changed."""
     words = [token.text.lower() for token in later[1:]]
@@ -181,14 +189,15 @@ class Routines:
             self._follow(name, subject)
         return self._leaving[subject][name]
 
-    def changed_by(self, name: str) -> set[str]:
-        """Which of SUBJECTS a call of a routine may set."""
-        return {subject for subject in SUBJECTS if not self.leaves(name, subject)}
+    def changed_by(self, name: str, found: Sequence[Token]) -> set[str]:
+        """Which of SUBJECTS a call of a routine among tokens may set."""
+        given = given_among(found) if name not in LEAVING else set()
+        return {subject for subject in SUBJECTS if subject in given or not self.leaves(name, subject)}
 
     def changed_later(self, later: Sequence[Token]) -> set[str]:
         """Which of SUBJECTS may be set by what an interrupt or a trigger does."""
         found = {subject for subject in SUBJECTS if set_later(later, subject)}
-        return found.union(*(self.changed_by(name) for name in called(later)))
+        return found.union(*(self.changed_by(name, later) for name in called(later)))
 
     def _follow(self, name: str, subject: str) -> None:
         """Find out of a routine, and of those that it calls, whether they leave a subject as it is."""
@@ -264,8 +273,10 @@ class Routines:
         words = [token.text.lower() for token in found]
         if not words or words[0] in EXTERNAL:
             return set()
-        sets = SUBJECTS[subject](words) or set_later(immediate(found)[1], subject)
-        return {*called(found), *([""] if sets else [])}
+        names = set(called(found))
+        given = subject in given_among(found) and not names <= LEAVING
+        sets = given or SUBJECTS[subject](words) or set_later(immediate(found)[1], subject)
+        return {*names, *([""] if sets else [])}
 
 
 def _arguments(found: list[Token]) -> set[str]:
