@@ -344,6 +344,9 @@ DATA += "DECL LDAT LCNONE={VEL 2.0}\nDECL LDAT LCTWICE={ORI_TYP #VAR}\nLCTWICE.O
 DATA = DATA.replace("TOOL_NO 1", "TOOL_NO 0")
 
 
+FLANGE = "$TOOL=$NULLFRAME\n$BASE=$NULLFRAME"
+
+
 def inline(name):
     """What an inline form of a line sets, with line data of a name."""
     return f"LDAT_ACT={name}\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2.0)"
@@ -363,13 +366,21 @@ def inline(name):
         ("IF $IN[1] THEN\n$ORI_TYPE=#CONSTANT\nENDIF", "$ORI_TYPE: it is not the same on all ways"),
         (f"{inline('LCCONSTANT')}\n{inline('LCNONE')}", KEPT),
         ("turned()", "$ORI_TYPE: a subroutine was called"),
-        ("OUTSIDE()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME", "$ORI_TYPE: a subroutine was called"),
+        (f"OUTSIDE()\n{FLANGE}", "and may have set another: set $ORI_TYPE=#VAR behind it"),
+        ("given($ORI_TYPE)", "$ORI_TYPE: a subroutine was called"),
+        ("giving()", "$ORI_TYPE: a subroutine was called"),
+        ("INTERRUPT DECL 5 WHEN $IN[1] DO given($ORI_TYPE)", "$ORI_TYPE: an interrupt or a trigger"),
+        ("named()", "$ORI_TYPE: a subroutine was called"),
+        ("$ORI_TYPE=#CONSTANT\neven()", "$ORI_TYPE: a subroutine was called"),
+        ("INTERRUPT DECL 5 WHEN $IN[1] DO $ORI_TYPE=#CONSTANT", "$ORI_TYPE: an interrupt or a trigger"),
         ("INTERRUPT DECL 5 WHEN $IN[1] DO turned()", "$ORI_TYPE: an interrupt or a trigger"),
         ("$ORI_TYPE=#CONSTANT\nGOTO over\n$ORI_TYPE=#VAR\nover:\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME", "GOTO"),
     ],
 )
 def test_orientations_that_the_controller_does_not_take_from_the_target(before, told):
-    behind = "DEF turned()\n$ORI_TYPE=#CONSTANT\nEND\n"
+    behind = "DEF turned()\n$ORI_TYPE=#CONSTANT\nEND\nDEF even()\n$ORI_TYPE=#VAR\nEND\n"
+    behind += "DEF given(x:OUT)\nx=#CONSTANT\nEND\nDEF named()\n$ORI_TYPE=var\nEND\n"
+    behind += "DEF giving()\ngiven($ORI_TYPE)\nEND\n"
     src = f"{ALREADY}PTP {HERE}\n{before}\n@\nPTP {HERE}\nEND\n{behind}"
     for move in (f"LIN {THERE}", f"SLIN {THERE}", f"SPLINE\nSPL {THERE}\nENDSPLINE"):
         assert changed(src.replace("@", move), DATA) == [True, False, True]
@@ -390,6 +401,8 @@ def test_orientations_that_the_controller_does_not_take_from_the_target(before, 
         "FDAT_ACT=FP1\nBAS(#CP_PARAMS,2.0)",
         "BAS(#PTP_PARAMS,100)\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME",
         "even()",
+        "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $ORI_TYPE=#VAR",
+        "INTERRUPT DECL 5 WHEN $IN[1] DO $ORI_TYPE=#JOINT",
         f"SLIN {HERE} WITH $ORI_TYPE=#VAR",
     ],
 )
@@ -413,6 +426,49 @@ def test_a_routine_that_leaves_orientations_and_not_the_tool():
     src = f"{ALREADY}PTP {HERE}\nweld()\n@\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nLIN {HERE}\nEND\n{weld}"
     assert changed(src.replace("@", "")) == [True, True, True]
     assert changed(src.replace("@", "$ORI_TYPE=#CONSTANT\nweld()")) == [True, False, False]
+
+
+@pytest.mark.parametrize("said", ["", "$ORI_TYPE=#VAR", ";$ORI_TYPE=#CONSTANT", inline("LCVAR")])
+def test_routines_elsewhere_are_expected_to_set_no_mode_that_the_files_do_not(said):
+    dat = DATA[: DATA.index("DECL LDAT LCCONSTANT")]
+    src = f"{ALREADY}PTP {HERE}\n{said}\nOUTSIDE()\n{FLANGE}\nLIN {THERE}\nLIN {HERE}\nEND\n"
+    assert all(changed(src, dat))
+    assert changed(src.replace("LIN", "PTP", 1) + "DEF b()\n$ORI_TYPE=MODE\nEND\n")[1:] == [True, False]
+    assert all(changed(f"{ALREADY}PTP {HERE}\nEND\nGLOBAL DEF b()\n{FLANGE}\nLIN {THERE}\nEND\n", dat))
+
+
+def test_line_data_that_no_file_has_may_be_of_any_mode():
+    src = f"{ALREADY}PTP {HERE}\nOUTSIDE()\n{FLANGE}\nLIN {THERE}\n{inline('LCELSEWHERE')}\nEND\n"
+    assert changed(src, DATA[: DATA.index("DECL LDAT")]) == [True, False]
+
+
+@pytest.mark.parametrize("what", ["TRIGGER WHEN DISTANCE=0 DELAY=0", "INTERRUPT DECL 5 WHEN $IN[1]"])
+@pytest.mark.parametrize("mode", ["#VAR", "#CONSTANT"])
+def test_what_sets_a_mode_later_leaves_tool_and_base(what, mode):
+    src = f"{ALREADY}PTP {HERE}\n{what} DO $ORI_TYPE={mode}\nPTP {THERE}\nPTP {HERE}\nEND\n"
+    assert all(changed(src))
+
+
+def test_a_goto_around_a_mode_leaves_tool_and_base():
+    src = f"{ALREADY}PTP {HERE}\n$ORI_TYPE=#CONSTANT\nGOTO over\n$ORI_TYPE=#VAR\nover:\nPTP {THERE}\nEND\n"
+    assert all(changed(src))
+
+
+@pytest.mark.parametrize("before", ["", "$ORI_TYPE=#VAR"])
+@pytest.mark.parametrize(
+    ("inside", "expected"),
+    [
+        ("$ORI_TYPE=#VAR", [True, True, False]),
+        (inline("LCVAR"), [True, True, False]),
+        ("IF $IN[1] THEN\n$ORI_TYPE=#VAR\nENDIF", [True, False, False]),
+        ("even()", [True, False, False]),
+        ("IF $IN[1] THEN\n$ORI_TYPE=#JOINT\nENDIF", [True, False, False]),
+    ],
+)
+def test_a_mode_set_in_a_loop_counts_whatever_comes_round(before, inside, expected):
+    loop = f"LOOP\n{inside}\nLIN {THERE}\n$ORI_TYPE=#CONSTANT\nLIN {HERE}\nENDLOOP\nEND\n"
+    behind = "DEF even()\n$ORI_TYPE=#VAR\nEND\n"
+    assert changed(f"{ALREADY}PTP {HERE}\n{before}\n{loop}{behind}", DATA) == expected
 
 
 def test_a_loop_that_comes_round_with_orientations_that_do_not_count():

@@ -350,6 +350,49 @@ def test_how_far_an_arc_with_an_angle_turns_is_left_open():
     assert reasons(held) == []
 
 
+def wide_arc():
+    """An arc on which the tool is turned from start to end about another axis than that of the path."""
+    arc = arc_of(KUKA, DIALECTS["KRL"][3], tilt=np.eye(3), turn_deg=0.0)
+    arc.tools[2, :3, :3] = Rotation.from_euler("x", 40, degrees=True).as_matrix() @ arc.tools[0, :3, :3]
+    arc.q = near(KUKA, arc.tools, arc.q[0])
+    return arc
+
+
+@pytest.mark.parametrize(
+    ("said", "behind", "listed"),
+    [
+        ("$CIRC_TYPE=#PATH", "", True),
+        ("$circ_type = KIND", "", True),
+        ("$CIRC_TYPE=#BASE", "", False),
+        (";$CIRC_TYPE=#PATH", "", False),
+        ("$CIRC_TYPE=SCIRC_TYP(LC)", "", True),
+        ("", "DEF b()\nLDAT_ACT={VEL 2.0,ORI_TYP #VAR,CIRC_TYP #PATH}\nEND\n", True),
+        ("", "DEF b()\nLDAT_ACT={VEL 2.0,ORI_TYP #VAR,CIRC_TYP #BASE}\nEND\n", False),
+    ],
+)
+def test_where_a_krl_program_may_turn_tools_as_seen_from_the_path_both_ways_have_to_agree(
+    said, behind, listed
+):
+    arc = wide_arc()
+    way = Arc.through(arc.tools[0], [arc.tools[1]], arc.tools[2])
+    assert way is not None
+    share = way.share_of(arc.tools[1, :3, 3])
+    apart = Rotation.from_matrix(way.turned(share).T @ way.turned_on_path(share)).magnitude()
+    found = reasons(rewritten(KRL(), f"{of_krl(arc)}{behind}".replace("PTP", f"{said}\nPTP", 1), KUKA, by=BY))
+    assert [f"which leaves {np.rad2deg(apart):.1f} deg open" in reason for *_, reason in found] == (
+        [True] if listed else []
+    )
+
+
+@pytest.mark.parametrize("motion", ["CIRC {1},{2}", "SCIRC {1},{2}", "CIRC {1},{2},CA 90"])
+def test_a_via_point_that_the_wrist_passes_axis_by_axis_is_listed_and_its_end_is_not(motion):
+    text = of_krl(arc_of(KUKA, DIALECTS["KRL"][3], tilt=np.eye(3), turn_deg=0.0), motion)
+    assert reasons(rewritten(KRL(), text, KUKA, by=BY)) == []
+    for said in ("$ORI_TYPE=#JOINT", "IF $IN[1] THEN\n$ORI_TYPE=#JOINT\nENDIF"):
+        ((_, _, reason),) = reasons(rewritten(KRL(), text.replace("PTP", f"{said}\nPTP", 1), KUKA, by=BY))
+        assert reason.startswith("the arc turns the axes of the wrist evenly, and not the tool")
+
+
 def test_a_via_point_behind_what_is_not_known_is_left():
     arc = arc_of(ABB, DIALECTS["RAPID"][3])
     done = rewritten(

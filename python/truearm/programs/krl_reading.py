@@ -14,20 +14,18 @@ from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
 from truearm.programs.gathered import Gathered
 from truearm.programs.krl_order import Order, Place
-from truearm.programs.krl_orientation import MODAL
+from truearm.programs.krl_orientation import BEHIND, MODAL
 from truearm.programs.krl_routines import (
     BAS_LEAVING,
     DOING_LATER,
     EXTERNAL,
     LEAVING,
-    ORIENTATION,
     SETTING,
     Routine,
     Routines,
     bas_command,
     called,
     immediate,
-    set_later,
 )
 from truearm.programs.krl_state import (
     CALLED,
@@ -118,7 +116,7 @@ class KrlReading:
         self._found = Gathered(sources)
         self._storage = KrlStorage()
         self._numbers: dict[str, int] = {}
-        self._in_spline, self._interrupting, self._disorienting = False, False, False
+        self._in_spline, self._changing = False, set[str]()
         self._used: list[int | None] = []
         self._calls: dict[str, list[Call]] = {}
         for number in self._data_first():
@@ -168,7 +166,7 @@ class KrlReading:
         elif ASSIGNING.match(source.text, start, end):
             self._assignment(file, reader)
         elif word == "bas":
-            self._bas(reader)
+            self._bas((file, start), reader)
         else:
             self._statement(word, reader, (file, start))
 
@@ -192,24 +190,18 @@ class KrlReading:
     def _calls_of(self, found: list[Token]) -> None:
         """Routines that a line calls may set tool and base, and move the arm."""
         now, later = immediate(found)
-        touched = {"$tool", "$base"} & names_in(now)
         for name in called(now):
             if self._routines.local(name):
                 self._called(name)
-            if not self._routines.leaves(name) or (touched and name not in LEAVING):
-                self._flow.state = self._flow.state.without_frames(CALLED)
-            if not self._routines.leaves(name, ORIENTATION):
-                self._flow.state = self._flow.state.disoriented(CALLED)
+            changed = self._routines.changed_by(name, now)
+            self._flow.state = self._flow.state.changed(changed, CALLED, BEHIND)
             if self._routines.local(name) or name not in LEAVING:
                 self._flow.jump()
         for name in called(later):
             if self._routines.local(name):
                 call = Call(None, self._flow.state.lost(INTERRUPTED), self._order.here())
                 self._calls.setdefault(name, []).append(call)
-            self._interrupting |= not self._routines.leaves(name)
-            self._disorienting |= not self._routines.leaves(name, ORIENTATION)
-        if set_later(later):
-            self._interrupting = self._disorienting = True
+        self._changing |= self._routines.changed_later(later)
         if later and found[0].text.lower() != "trigger":
             self._after_interrupts()
 
@@ -222,10 +214,8 @@ class KrlReading:
 
     def _after_interrupts(self) -> None:
         """What interrupts and triggers may have set by now."""
-        if self._interrupting and not self._in_spline:
-            self._flow.state = self._flow.state.without_frames(INTERRUPTED)
-        if self._disorienting and not self._in_spline:
-            self._flow.state = self._flow.state.disoriented(INTERRUPTED)
+        if not self._in_spline:
+            self._flow.state = self._flow.state.changed(self._changing, INTERRUPTED)
 
     def _statement(self, word: str, reader: Reader, place: tuple[int, int]) -> None:
         flow = self._flow
@@ -248,7 +238,7 @@ class KrlReading:
             self._label(place)
         elif word in SPLINES:
             self._in_spline, self._around = True, flow.state
-            flow.state = self._with(reader.rest())
+            flow.state = self._with(place, reader.rest())
         elif word == SPLINE_ENDS:
             self._in_spline, flow.state = False, self._around
             self._after_interrupts()
@@ -259,11 +249,10 @@ class KrlReading:
         """Statements that a GOTO may lead to from elsewhere follow."""
         if self._gone:
             self._order.forget()
-        if self._routines.wanders(*place):
-            self._flow.state = self._flow.state.lost(JUMPED)
+        self._flow.state = self._flow.state.changed(self._routines.wandering(*place), JUMPED)
         self._flow.jump()
 
-    def _bas(self, reader: Reader) -> None:
+    def _bas(self, place: tuple[int, int], reader: Reader) -> None:
         """BAS sets what the inline forms prepared."""
         command, number = bas_command([token.text.lower() for token in reader.rest()])
         state = self._flow.state
@@ -275,11 +264,11 @@ class KrlReading:
             name = f"#{command.upper()}" if command else ""
             self._flow.state = state.lost(f"BAS({name}) was called since it was set")
         if command:
-            orientation = state.orientation.behind_bas(command)
+            orientation = state.orientation.behind_bas(command, place)
             self._flow.state = replace(self._flow.state, orientation=orientation)
 
     def _assignment(self, file: int, reader: Reader) -> None:
-        variable = named(reader)
+        place, variable = (file, reader.offset), named(reader)
         if variable is None:
             return
         state, kind = self._flow.state, variable.name.removeprefix("$")
@@ -292,7 +281,9 @@ class KrlReading:
             self._flow.state = replace(state, prepared=prepared)
         elif variable.name in MODAL:
             told = "".join(token.text.lower() for token in reader.rest())
-            self._flow.state = self._frames.oriented(state, variable.name, f"={told}" if whole else told)
+            self._flow.state = self._frames.oriented(
+                state, variable.name, f"={told}" if whole else told, place
+            )
         elif not whole:
             return
         elif variable.name == "$ipo_mode":
@@ -318,12 +309,13 @@ class KrlReading:
         found = reader.rest()
         words = [token.text.lower() for token in found]
         before = self._flow.state
-        self._flow.state = self._with(found).along(motion)
+        self._flow.state = self._with(place, found).along(motion)
         blended = word == "spl" or self._in_spline or bool(BLENDING & set(words))
         kinds = [Motion.VIA, Motion.CIRCULAR] if motion == Motion.CIRCULAR else [motion]
         for number, (kind, chain) in enumerate(zip(kinds, chains, strict=True)):
             if kind == Motion.VIA:
-                self._found.vias[len(self._found.moves)] = Via.OPEN if ANGLE in words else VIAS[word]
+                via = Via.ON_PATH if self._frames.mentioned.on_path and word == "circ" else VIAS[word]
+                self._found.vias[len(self._found.moves)] = Via.OPEN if ANGLE in words else via
             if not self._go(place, chain, kind, blended=blended or kind == Motion.VIA):
                 self._storage.read |= names_in([token for part in _parts(whole)[number:] for token in part])
         if "with" in words:
@@ -333,7 +325,7 @@ class KrlReading:
         self._flow.state = before
         self._after_interrupts()
 
-    def _with(self, found: list[Token]) -> Modal:
+    def _with(self, place: tuple[int, int], found: list[Token]) -> Modal:
         """The state of a motion with settings of its own, such as WITH $TOOL=STOOL2(FP1)."""
         state = self._flow.state
         words = [token.text.lower() for token in found]
@@ -353,7 +345,7 @@ class KrlReading:
             elif text.startswith("$ipo_mode="):
                 state = replace(state, remote=remote(text.partition("=")[2]))
             elif text.startswith("$ori_type="):
-                state = self._frames.oriented(state, "$ori_type", text.removeprefix("$ori_type"))
+                state = self._frames.oriented(state, "$ori_type", text.removeprefix("$ori_type"), place)
         return state
 
     def _go(self, place: tuple[int, int], chain: Operands | None, motion: Motion, *, blended: bool) -> bool:
@@ -365,7 +357,7 @@ class KrlReading:
             self._flow.jump()
             return False
         numbers, which = found
-        meant, unheeded = self._environment(chain, which), self._flow.state.orientation.unheeded
+        meant, unheeded = self._environment(chain, which), self._flow.state.orientation.why_not(motion)
         if unheeded and not meant.why_not_poses:
             self._found.keep(numbers, unheeded)
         environment = self._found.environments.number(meant)

@@ -1,13 +1,13 @@
 """What routines a KRL program has and calls, and which of them leave tool, base and arm as they are."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
-from truearm.programs.krl_orientation import HEEDING, MODAL
+from truearm.programs.krl_orientation import HEEDING, MODAL, VAR, set_in
 from truearm.programs.krl_storage import HEADER, is_data, lines
 from truearm.programs.krl_values import line_reader
 from truearm.programs.lexing import Token
@@ -85,11 +85,6 @@ def immediate(found: list[Token]) -> tuple[list[Token], list[Token]]:
     return found[:at], found[at:]
 
 
-def set_later(later: Sequence[Token]) -> bool:
-    """Whether what an interrupt or a trigger does is to set what stays until it is changed."""
-    return len(later) > 1 and later[1].text.lower() in SETTING | MODAL
-
-
 def bas_command(words: Sequence[str]) -> tuple[str, str]:
     """Command and number of a call of BAS, whose tokens are in small letters; "?" for no number."""
     command = words[3] if len(words) > 3 and words[1:3] == ["(", "#"] else ""
@@ -108,13 +103,38 @@ def _orients(words: Sequence[str]) -> bool:
     """Whether a statement makes that orientations may not count, or that BAS makes so."""
     if words[0] == "bas":
         return bas_command(words)[0] in BAS_ORIENTING
-    return words[0] in MODAL and words[-1] not in HEEDING
+    return words[0] in MODAL and set_in(words) not in HEEDING
+
+
+def _setting(mode: str) -> Callable[[Sequence[str]], bool]:
+    """Tells whether a statement sets a mode in which orientations count."""
+
+    def sets(words: Sequence[str]) -> bool:
+        if words[0] == "bas":
+            return mode == VAR and bas_command(words)[0] == "initmov"
+        return words[0] in MODAL and set_in(words) == mode
+
+    return sets
 
 
 FRAMES: Final = "frames"
 ORIENTATION: Final = "orientation"
-SUBJECTS: Final = {FRAMES: _sets_frames, ORIENTATION: _orients}
+SUBJECTS: Final = {FRAMES: _sets_frames, ORIENTATION: _orients} | {mode: _setting(mode) for mode in HEEDING}
 """What routines may leave as it is, and which statements set it."""
+
+
+GIVEN: Final = {"$tool": FRAMES, "$base": FRAMES, "$ori_type": ORIENTATION}
+
+
+def given_among(found: Sequence[Token]) -> set[str]:
+    """Which of SUBJECTS a routine may set that is given what is among tokens."""
+    return {GIVEN[word] for token in found if (word := token.text.lower()) in GIVEN}
+
+
+def set_later(later: Sequence[Token], subject: str) -> bool:
+    """Whether what an interrupt or a trigger does sets a subject, which stays until it is changed."""
+    words = [token.text.lower() for token in later[1:]]
+    return bool(words) and SUBJECTS[subject](words)
 
 
 class Routines:
@@ -126,7 +146,7 @@ class Routines:
         self._by_name = {routine.name: routine for routine in self._all if routine.name}
         self._by_place = {(routine.file, routine.start): routine for routine in self._all if routine.name}
         self._leaving: dict[str, dict[str, bool]] = {subject: {} for subject in SUBJECTS}
-        self._wandering: dict[Routine, bool] = {}
+        self._wandering: dict[Routine, set[str]] = {}
 
     def _programs(self) -> list[int]:
         return [n for n, source in enumerate(self._sources) if not is_data(source)]
@@ -169,6 +189,16 @@ class Routines:
             self._follow(name, subject)
         return self._leaving[subject][name]
 
+    def changed_by(self, name: str, found: Sequence[Token]) -> set[str]:
+        """Which of SUBJECTS a call of a routine among tokens may set."""
+        given = given_among(found) if name not in LEAVING else set()
+        return {subject for subject in SUBJECTS if subject in given or not self.leaves(name, subject)}
+
+    def changed_later(self, later: Sequence[Token]) -> set[str]:
+        """Which of SUBJECTS may be set by what an interrupt or a trigger does."""
+        found = {subject for subject in SUBJECTS if set_later(later, subject)}
+        return found.union(*(self.changed_by(name, later) for name in called(later)))
+
     def _follow(self, name: str, subject: str) -> None:
         """Find out of a routine, and of those that it calls, whether they leave a subject as it is."""
         callers: dict[str, set[str]] = {}
@@ -192,16 +222,16 @@ class Routines:
             leaving |= dict.fromkeys(changed, False)
             setting += changed
 
-    def wanders(self, file: int, at: int) -> bool:
-        """Whether the routine around a label sets what stays where a GOTO may lead around it."""
+    def wandering(self, file: int, at: int) -> set[str]:
+        """Which of FRAMES and ORIENTATION the routine around a label sets where a GOTO may lead around it."""
         routine = next(one for one in self._all if one.file == file and one.start <= at < one.end)
         if routine not in self._wandering:
-            jumped, found = False, False
+            jumped, found = False, set[str]()
             for place in self._body(routine):
                 words = self._words(file, *place)
                 jumped |= words[:1] == ["goto"] or words[1:2] == [":"]
-                found |= jumped and (not MODAL.isdisjoint(words[:1]) or self._sets(file, *place))
-            self._wandering[routine] = found
+                found |= self._set_in(file, *place) if jumped else set()
+            self._wandering[routine] = {one if one == FRAMES else ORIENTATION for one in found}
         return self._wandering[routine]
 
     @cached_property
@@ -229,13 +259,13 @@ class Routines:
     def _words(self, file: int, start: int, end: int) -> list[str]:
         return [token.text.lower() for token in line_reader(self._sources[file], start, end).rest()]
 
-    def _sets(self, file: int, start: int, end: int) -> bool:
-        """Whether a line may set what stays until it is changed."""
-        return any(
-            not self.leaves(name, subject)
+    def _set_in(self, file: int, start: int, end: int) -> set[str]:
+        """Which of SUBJECTS a line may set."""
+        return {
+            subject
             for subject in SUBJECTS
-            for name in self._runs(file, start, end, subject)
-        )
+            if not all(self.leaves(name, subject) for name in self._runs(file, start, end, subject))
+        }
 
     def _runs(self, file: int, start: int, end: int, subject: str) -> set[str]:
         """Names of the routines that a line calls; an empty one where it sets a subject itself."""
@@ -243,8 +273,10 @@ class Routines:
         words = [token.text.lower() for token in found]
         if not words or words[0] in EXTERNAL:
             return set()
-        sets = SUBJECTS[subject](words) or set_later(immediate(found)[1])
-        return {*called(found), *([""] if sets else [])}
+        names = set(called(found))
+        given = subject in given_among(found) and not names <= LEAVING
+        sets = given or SUBJECTS[subject](words) or set_later(immediate(found)[1], subject)
+        return {*names, *([""] if sets else [])}
 
 
 def _arguments(found: list[Token]) -> set[str]:

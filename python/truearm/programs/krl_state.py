@@ -1,7 +1,7 @@
 """The tool and the base that are active in a KRL program, and where they are told."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -12,14 +12,17 @@ from truearm.programs.frames import KRL_WORLD, Frames, name_at_start, written_ou
 from truearm.programs.krl_order import Order
 from truearm.programs.krl_orientation import (
     HEEDED,
+    HEEDING,
     LINE_DATA,
     USUAL,
+    VAR,
+    Mentioned,
     Orientation,
+    mode_in,
     mode_of,
     named_in,
-    unheeded_in,
 )
-from truearm.programs.krl_routines import Routines
+from truearm.programs.krl_routines import FRAMES, ORIENTATION, Routines
 from truearm.programs.krl_storage import WORLD_SET_BY, KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
@@ -91,9 +94,10 @@ class Modal:
             for mine, was, now in ((self.tool, before.tool, again.tool), (self.base, before.base, again.base))
             if not mine.unknown
         ]
-        modes = [(one.remote, one.orientation.unheeded) for one in (self, before, again)]
-        parts = [*known, *zip(*modes, strict=True)]
-        return any(mine == was != now for mine, was, now in parts)
+        parts = [*known, (self.remote, before.remote, again.remote)]
+        return self.orientation.overruled(before.orientation, again.orientation) or any(
+            mine == was != now for mine, was, now in parts
+        )
 
     def joined(self, other: "Modal") -> "Modal":
         """What is known where two branches meet."""
@@ -117,17 +121,27 @@ class Modal:
 
     def disoriented(self, why: str) -> "Modal":
         """The state where it is not known any more whether the orientation of targets counts."""
-        return replace(self, orientation=Orientation.lost(why))
+        return replace(self, orientation=self.orientation.lost(why))
+
+    def changed(self, subjects: Collection[str], why: str, way_out: str = "") -> "Modal":
+        """The state where something may have set some of SUBJECTS; `way_out` is told of orientations."""
+        if not subjects:
+            return self
+        state = self.without_frames(why) if FRAMES in subjects else self
+        if ORIENTATION in subjects:
+            return state.disoriented(why + way_out)
+        orientation = state.orientation
+        for mode in (mode for mode in HEEDING if mode in subjects):
+            orientation = orientation.perhaps(mode, why + way_out)
+        return replace(state, orientation=orientation)
 
     def unprepared(self) -> "Modal":
         """The state where it is not known what inline forms have prepared."""
-        lost = Orientation.lost(DIFFERS)
-        orientation = self.orientation._replace(line_data=lost.line_data)
-        return replace(self, prepared=NOTHING, orientation=orientation)
+        return replace(self, prepared=NOTHING, orientation=self.orientation.unprepared(DIFFERS))
 
     def along(self, motion: Motion) -> "Modal":
         """The state as far as it matters for a motion: those joint by joint always heed orientations."""
-        joints = self.orientation._replace(unheeded=None)
+        joints = self.orientation._replace(mode=None)
         return replace(self, orientation=joints) if motion == Motion.JOINT else self
 
     def set(self, kind: str, frame: Frame) -> "Modal":
@@ -155,6 +169,7 @@ class KrlFrames:
         self._routines, self._order = routines, order
         self._world = self._find_world()
         self._written = {kind: self._names_of_written(kind) for kind in KINDS}
+        self.mentioned = Mentioned.of((source.text for source in sources), storage.values)
 
     def _find_world(self) -> Frame:
         """The world in the arm's base; not known, nor is any base, where the program may move it.
@@ -179,7 +194,8 @@ class KrlFrames:
         """
         tool, base = (name_at_start(f"${kind.upper()}", written=bool(self._written[kind])) for kind in KINDS)
         placed = self._placed("base", self._frames.at_start("object", base))
-        return Modal(self._frames.at_start("tool", tool), placed)
+        orientation = HEEDED._replace(elsewhere=self.mentioned.elsewhere)
+        return Modal(self._frames.at_start("tool", tool), placed, orientation=orientation)
 
     def payload_kg(self, state: Modal) -> float | None:
         """The mass that the program, or the frames file, states."""
@@ -251,36 +267,38 @@ class KrlFrames:
         text = self._sources[file].text[value.at : value.end].lower()
         return replace(state, remote=remote("#tcp" if re.search(r"ipo_frame\s*#tcp", text) else ""))
 
-    def oriented(self, state: Modal, name: str, told: str) -> Modal:
+    def oriented(self, state: Modal, name: str, told: str, at: tuple[int, int]) -> Modal:
         """The state behind an assignment to $ORI_TYPE or LDAT_ACT.
 
         Args:
             state: The state before it.
             name: Which of them.
             told: What stands behind the name, without blanks and in small letters.
+            at: Where it stands: file and offset.
         """
         before, value = state.orientation, told.partition("=")[2]
         if name != LINE_DATA:
             data = named_in(value)
-            found = self._by_line_data(data) if data else unheeded_in(value)
-            return replace(state, orientation=before if found is None else before._replace(unheeded=found))
+            found = self._by_line_data(data) if data else mode_in(value)
+            after = before if found is None else before._replace(mode=found, set_at=at)
+            return replace(state, orientation=after)
         if told.startswith("."):
-            found = unheeded_in(value) if told.startswith(".ori_typ=") else None
+            found = mode_in(value) if told.startswith(".ori_typ=") else None
         else:
             found = self._by_line_data(value)
         return replace(state, orientation=before if found is None else before._replace(line_data=found))
 
     def _by_line_data(self, told: str) -> str | None:
-        """What line data, by name or written out, make of `unheeded`; None where they leave it."""
+        """The mode of line data, by name or written out, or why it is not known; None if they have none."""
         if told == USUAL:
-            return ""
+            return VAR
         if not told.startswith("{"):
             name, file, value = self.frame_data(told)
             if value is None:
                 return f"$ORI_TYPE: {name} does not tell it in this program"
             told = self._sources[file].text[value.at : value.end].lower()
         mode = mode_of(told)
-        return None if mode is None else unheeded_in(mode)
+        return None if mode is None else mode_in(mode)
 
     def evaluated(self, kind: str, found: Operands | None) -> Frame:
         """A tool or base from operands joined by the geometric operator."""
