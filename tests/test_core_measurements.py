@@ -43,7 +43,7 @@ def measured(q, **more):
         "group": np.zeros(count, dtype=np.int64),
         "targets": points[:, None],
         "rotations": None,
-        "sigma": np.zeros(count),
+        "sigma": np.zeros((count, 4)),
         "weight": np.ones(count),
         "distances": [],
     }

@@ -70,7 +70,7 @@ class Arm:
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": points[:, None],
             "rotations": None,
-            "sigma": np.zeros(len(q)),
+            "sigma": np.zeros((len(q), 4)),
             "weight": np.ones(len(q)),
             "distances": [],
         }

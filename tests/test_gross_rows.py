@@ -9,6 +9,7 @@ from truearm.defaults import SEED
 from truearm.frame_share import FRAME_UNCERTAIN
 from truearm.rotations import matrix_from_quaternion, quaternion_from_rotation_vector
 from truearm.simulation import VirtualArm
+from truearm.updating import comparing
 from truearm.updating.scene import Scene
 
 COUNT = 90
@@ -115,7 +116,7 @@ def test_a_file_without_rows_names_them_too(known, clean):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """States at which it was asked how an unchanged arm may scatter."""
+    """States at which it was asked how an unchanged arm may scatter, other causes not counted."""
     states, covariance = [], Scene.covariance
 
     def counted(scene, state):
@@ -123,6 +124,7 @@ def asked(monkeypatch):
         return covariance(scene, state)
 
     monkeypatch.setattr(Scene, "covariance", counted)
+    monkeypatch.setattr(comparing, "explained_otherwise", lambda *_: [])
     return states
 
 

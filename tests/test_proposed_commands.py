@@ -300,7 +300,7 @@ def test_a_session_s_arm_is_called_as_the_library_knows_it(name, word, folder, m
 
         def __enter__(self):
             robot = ta.Robot.load(name).to_dict()
-            return SimpleNamespace(arm=robot, meta=lambda key: None, rows=lambda *_: [])
+            return SimpleNamespace(arm=robot, meta=lambda key: None, rows=lambda *_: [], notices=[])
 
         def __exit__(self, *_):
             return None
