@@ -74,7 +74,7 @@ def ours(model):
         "group": np.zeros(n, dtype=np.int64),
         "targets": model.measured[:, None, :],
         "rotations": None,
-        "sigma": np.zeros(n),
+        "sigma": np.zeros((n, 4)),
         "weight": np.ones(n),
         "distances": [],
     }

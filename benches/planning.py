@@ -86,7 +86,7 @@ class VirtualRvM2:
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": self.measured.position(q, self.true)[:, None],
             "rotations": None,
-            "sigma": np.zeros(len(q)),
+            "sigma": np.zeros((len(q), 4)),
             "weight": np.ones(len(q)),
             "distances": [],
         }
