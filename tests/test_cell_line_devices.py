@@ -136,6 +136,19 @@ def test_a_robot_is_there_when_it_is_still():
         np.testing.assert_array_equal(arm.at(), arm.end)
 
 
+def test_answers_that_come_late_are_not_taken_for_time_at_rest():
+    arm = Arm(lasts_s=1.0)
+
+    def late(line):
+        answer = arm(line)
+        time.sleep(0.15)
+        return answer
+
+    with robot_of(late) as robot:
+        robot.move_joints(START + np.radians([0.06, 0.0, 0.0, 0.0]))
+        np.testing.assert_array_equal(arm.at(), arm.end)
+
+
 def test_of_a_robot_whose_last_digits_flicker_the_median_is_read():
     with robot_of(Arm(flickers=0.004)) as robot:
         robot.move_joints(PLACE)

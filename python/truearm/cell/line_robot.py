@@ -184,6 +184,8 @@ class LineRobot(Managed):
         until = since + self._settings.motion_timeout_s
         while time.monotonic() < until:
             self._port.pause(ASKS_EVERY_S)
+            # An answer that is late is of some time behind the question.
+            asked = time.monotonic()
             now = self._where()
             if self._refusal:
                 # What it answers to a stop may look like a refusal.
@@ -191,7 +193,7 @@ class LineRobot(Managed):
                 raise RefusedError(f'it answers "{self._refusal}"', where=self._port.where)
             if not self._agree(now, rests_at):
                 rests_at, since = now, time.monotonic()
-            still_s = time.monotonic() - since
+            still_s = asked - since
             there = target is not None and self._agree(now, target)
             if there and still_s >= self._settings.still_s:
                 return True
