@@ -47,25 +47,24 @@ def _check_measured(table: Table, layout: Layout) -> None:
 
 
 def _lengths(table: Table, column: Column) -> Floats:
-    sigma = _positive(table, column)
-    refuse_rows(
-        table,
-        sigma > LARGEST_SIGMA_M,
-        f'column "{column.name}" is larger than {LARGEST_SIGMA_M:g} m in',
-        "A sigma is the standard deviation of a measured coordinate",
-        "Leave out rows in which nothing was measured, or check its unit: sigma is in m, sigma_mm in mm",
-    )
-    return sigma
+    of = "A sigma is the standard deviation of a measured coordinate"
+    return _below(table, column, (LARGEST_SIGMA_M, "m"), of, "its unit: sigma is in m, sigma_mm in mm")
 
 
 def _angles(table: Table, column: Column) -> Floats:
-    sigma = _positive(table, column)
+    of = "A sigma is the standard deviation of a measured orientation about each axis"
+    return _below(table, column, (LARGEST_SIGMA_RAD, "rad"), of, "its unit")
+
+
+def _below(table: Table, column: Column, most: tuple[float, str], rule: str, check: str) -> Floats:
+    """Sigmas (n,), m or rad, none of which is larger than `most`, in its unit."""
+    sigma, (largest, unit) = _positive(table, column), most
     refuse_rows(
         table,
-        sigma > LARGEST_SIGMA_RAD,
-        f'column "{column.name}" is larger than {LARGEST_SIGMA_RAD:g} rad in',
-        "A sigma is the standard deviation of a measured orientation about each axis",
-        "Leave out rows in which nothing was measured, or check its unit",
+        sigma > largest,
+        f'column "{column.name}" is larger than {largest:g} {unit} in',
+        rule,
+        f"Leave out rows in which nothing was measured, or check {check}",
     )
     return sigma
 
