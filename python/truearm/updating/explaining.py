@@ -169,6 +169,7 @@ class Explaining:
                 check_enough(self.data, self.task, self.unknowns.beside(cause))
                 yield self._with(cause)
             except TruearmError:
+                # Too few rows are left for one unknown more: it is not asked for.
                 continue
 
     def _with(self, cause: Cause) -> Explanation:
