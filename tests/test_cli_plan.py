@@ -113,6 +113,7 @@ def test_each_target_that_the_calibration_found_stays_in_the_room(tmp_path, caps
         (["--box-mm", "0,0,0,1,1,-1"], "the lowest x, y, z and then the highest"),
         (["--floor-mm", "nan"], "--floor-mm: nan. It must be finite"),
         (["--floor-mm", "9000"], "0 of 20000 random poses can be measured"),
+        (["--floor-mm", "9000"], "each rule alone allows: AboveFloor 0, ClearOfItself 1"),
     ],
 )
 def test_a_room_that_is_none_is_told(words, message, tmp_path, capsys):

@@ -249,7 +249,7 @@ def test_parameters_of_a_division_are_named_once(names):
 
 def test_a_space_that_cannot_be_divided_is_told_in_words():
     workspace = Workspace(JointSpace(RV_M2), VirtualArm.paper().true_position)
-    with pytest.raises(WorkError, match="condition number of the whole workspace.*higher limit"):
+    with pytest.raises(WorkError, match=r"whole workspace.*where 0\.5 is allowed.*higher limit"):
         divide_space(WORLD, workspace, PAPER_PARAMETERS, DivisionOptions(limit=0.5))
 
 

@@ -70,6 +70,28 @@ pub enum FieldError {
         /// Highest value.
         high: f64,
     },
+    /// A whole workspace whose poses tell too little of the CEPs.
+    #[error(
+        "the condition number of the whole workspace's poses is {kappa:.1} where {limit} is allowed: give more poses \
+         or candidates, fewer parameters, or a higher limit"
+    )]
+    IllConditioned {
+        /// Their condition number.
+        kappa: f64,
+        /// The largest that is allowed.
+        limit: f64,
+    },
+    /// A whole workspace with fewer poses than a region takes.
+    #[error(
+        "the whole workspace has {found} poses where a region takes {needed}: widen the workspace, loosen its rules, \
+         measure more, or ask for fewer poses a region"
+    )]
+    Scarce {
+        /// Poses that there are.
+        found: usize,
+        /// Poses that it takes.
+        needed: usize,
+    },
     /// Hyper-parameters of no arm, as a file that was changed may hold.
     #[error("the hyper-parameters of the field are of no use: {what}; calibrate again")]
     Hyper {

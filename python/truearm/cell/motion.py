@@ -15,7 +15,7 @@ from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.errors import InputError
-from truearm.planning.accessibility import Rule, accessible, lowest
+from truearm.planning.accessibility import Rule, accessible, lowest, name_of
 from truearm.planning.folding import ClearOfItself
 from truearm.planning.joint_ways import JointWays
 from truearm.robot import Robot
@@ -117,6 +117,14 @@ class Motion:
                 rows = np.flatnonzero(kept)
                 kept[rows] = accessible(self.arm, self.run_up.beside(readings[rows], side), rules, tool=tool)
         return kept
+
+    def allowed_by_each(self, readings: Floats) -> list[tuple[str, int]]:
+        """How many of poses (n, N) each rule alone allows, by its name: the strictest first."""
+        found = []
+        for rule in self.rules:
+            masks = [accessible(self.arm, readings, [rule], tool=tool) for tool in self.tools]
+            found.append((name_of(rule), int(np.count_nonzero(np.all(masks, axis=0)))))
+        return sorted(found, key=lambda each: each[1])
 
     def walk(self) -> "Walk | FreeWalk":
         """A walk from step to step that has not begun."""

@@ -246,10 +246,17 @@ def measurable_pool(motion: Motion, size: int, seed: int, held: Mapping[int, flo
             break
     raise WorkError(
         f"{len(found)} of {drawn} random poses can be measured",
-        rule=f"A pool of {size} is needed",
+        rule=f"A pool of {size} is needed{_told_of_rules(motion, seed)}",
         way_out=f"Look at {'' if cell is None else OF_CELL}--floor-mm, --box-mm, --link-radius-mm and the "
         "joints' limits, or ask for fewer poses",
     )
+
+
+def _told_of_rules(motion: Motion, seed: int) -> str:
+    """What each rule alone makes of the first poses that are drawn, in words; "" where there are no rules."""
+    first = next(_drawn(motion, seed))
+    told = ", ".join(f"{name} {count}" for name, count in motion.allowed_by_each(first))
+    return told and f"; of {len(first)} of them each rule alone allows: {told}"
 
 
 def _drawn(motion: Motion, seed: int) -> Iterator[Floats]:

@@ -106,11 +106,16 @@ def accessible(
         if answer.shape != rows.shape:
             raise InputError(
                 f"a rule of accessibility answered with shape {answer.shape}",
-                where=getattr(rule, "__name__", type(rule).__name__),
+                where=name_of(rule),
                 rule=f"It must say true or false of each of {len(rows)} poses",
             )
         allowed[rows] = answer.astype(np.bool_)
     return allowed
+
+
+def name_of(rule: Rule) -> str:
+    """The name of a rule's function or class."""
+    return str(getattr(rule, "__name__", type(rule).__name__))
 
 
 @dataclass(frozen=True)

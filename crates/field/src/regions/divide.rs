@@ -4,7 +4,7 @@
 //! compensation leaves too; a region whose halves could not be well conditioned stays whole, so that none is
 //! estimated from ill-conditioned poses; a half that cannot be reached stays without CEPs.
 
-use truearm_estimate::{EstimateError, FrameMode, MeasurementSet, Problem, Setup};
+use truearm_estimate::{FrameMode, MeasurementSet, Problem, Setup};
 use truearm_kinematics::Chain;
 
 use crate::FieldError;
@@ -177,19 +177,12 @@ impl<S: Source> Work<'_, S> {
 
     fn whole(&mut self) -> Result<(), S::Error> {
         let prepared = self.prepare(0)?;
-        let refuse =
-            |what, value, rule| Err(FieldError::from(EstimateError::Option { what, value, rule }).into());
         match prepared.verdict {
             Verdict::Ready(_) => self.enter(0, &prepared, &vec![0.0; self.arm.columns.len()]),
-            Verdict::IllConditioned(kappa) => {
-                let rule = "it must be within the limit: give more poses or candidates, fewer parameters, or a higher limit";
-                refuse("the condition number of the whole workspace's poses", kappa.round(), rule)
+            Verdict::IllConditioned { kappa, limit } => {
+                Err(FieldError::IllConditioned { kappa, limit }.into())
             }
-            Verdict::Scarce => {
-                let rule =
-                    "it must be enough for a region: widen the workspace, loosen its rules or measure more";
-                refuse("the number of poses in the whole workspace", prepared.rows.len() as f64, rule)
-            }
+            Verdict::Scarce { found, needed } => Err(FieldError::Scarce { found, needed }.into()),
         }
     }
 
@@ -257,8 +250,8 @@ impl<S: Source> Work<'_, S> {
             let before = self.division.regions.clone();
             let child = self.division.regions.halve(region, axis);
             let halves = [self.prepare(child)?, self.prepare(child + 1)?];
-            let scarce = halves.iter().filter(|half| half.verdict == Verdict::Scarce).count();
-            let ill = halves.iter().any(|half| matches!(half.verdict, Verdict::IllConditioned(_)));
+            let scarce = halves.iter().filter(|half| matches!(half.verdict, Verdict::Scarce { .. })).count();
+            let ill = halves.iter().any(|half| matches!(half.verdict, Verdict::IllConditioned { .. }));
             if !ill && (scarce == 0 || scarce == 1 && S::SCARCE_HALVES) {
                 let width = self.arm.columns.len();
                 let start = self.division.ceps[region * width..(region + 1) * width].to_vec();

@@ -55,14 +55,18 @@ impl Source for Recorded<'_> {
     fn prepare(&mut self, low: &[f64], high: &[f64], _seed: u64) -> Result<Prepared, FieldError> {
         let rows = self.within(low, high, false);
         let verdict = if rows.len() < self.poses {
-            Verdict::Scarce
+            Verdict::Scarce { found: rows.len(), needed: self.poses }
         } else {
             let (set, _) = self.subset(&rows);
             let part = Problem { measurements: &set, ..self.problem };
             let held = Held { parameters: self.parameters, setup: self.setup };
             let (matrix, _) = scaled(&part, &held.rows(&part, &vec![0.0; part.columns.len()])?);
             let kappa = observability(&matrix, rows.len()).map_err(FieldError::from)?.kappa;
-            if kappa <= self.limit { Verdict::Ready(kappa) } else { Verdict::IllConditioned(kappa) }
+            if kappa <= self.limit {
+                Verdict::Ready(kappa)
+            } else {
+                Verdict::IllConditioned { kappa, limit: self.limit }
+            }
         };
         Ok(Prepared { verdict, joints: Vec::new(), rows })
     }

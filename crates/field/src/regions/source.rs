@@ -10,9 +10,19 @@ pub enum Verdict {
     /// Yes: the poses to identify them from have this condition number.
     Ready(f64),
     /// The best poses are conditioned worse than the limit allows: the region is too small.
-    IllConditioned(f64),
+    IllConditioned {
+        /// Their condition number.
+        kappa: f64,
+        /// The limit.
+        limit: f64,
+    },
     /// There are too few poses in it.
-    Scarce,
+    Scarce {
+        /// Poses that there are.
+        found: usize,
+        /// Poses that it takes.
+        needed: usize,
+    },
 }
 
 /// A region looked at before anything is measured in it.

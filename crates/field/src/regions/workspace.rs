@@ -84,8 +84,10 @@ impl<W: Workspace> Source for Active<'_, W> {
         let found = self.workspace.candidates(low, high, self.options.candidates, seed)?;
         let width = self.chain.joint_count();
         let count = self.count(&found, low.len())?;
-        if count < self.options.poses {
-            return Ok(Prepared { verdict: Verdict::Scarce, joints: Vec::new(), rows: Vec::new() });
+        let needed = self.options.poses;
+        if count < needed {
+            let verdict = Verdict::Scarce { found: count, needed };
+            return Ok(Prepared { verdict, joints: Vec::new(), rows: Vec::new() });
         }
         let (jacobian, rows) = self.jacobian(&found.joints).map_err(FieldError::from)?;
         let options = &self.options;
@@ -101,8 +103,11 @@ impl<W: Workspace> Source for Active<'_, W> {
         };
         let choice = choose_poses(&jacobian, rows, &how).map_err(FieldError::from)?;
         let kappa = choice.after.kappa;
-        let verdict =
-            if choice.well_conditioned { Verdict::Ready(kappa) } else { Verdict::IllConditioned(kappa) };
+        let verdict = if choice.well_conditioned {
+            Verdict::Ready(kappa)
+        } else {
+            Verdict::IllConditioned { kappa, limit: options.limit }
+        };
         let joints = choice.chosen.iter().flat_map(|&k| &found.joints[k * width..(k + 1) * width]).copied();
         Ok(Prepared { verdict, joints: joints.collect(), rows: choice.chosen })
     }
