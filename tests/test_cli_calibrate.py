@@ -171,7 +171,9 @@ def test_warnings_go_to_stderr(folder, table, capsys):
     assert main(["calibrate", "rv-m2", "twice.csv", "-o", "out", "--model", "constant", "--json"]) == 0
     printed = capsys.readouterr()
     assert "Warning: Identical to an earlier row in everything, counted once: row 81." in printed.err
-    assert "row 81" in json.loads(printed.out)["notices"][0]
+    (notice,) = json.loads(printed.out)["notices"]
+    assert notice["kind"] == "identical_rows"
+    assert "row 81" in notice["message"]
 
 
 def test_limits_warn(folder, table, capsys):

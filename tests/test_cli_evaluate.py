@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -63,6 +64,18 @@ def test_a_calibration_that_does_not_help_is_not_suggested_for_programs(folder, 
     printed = capsys.readouterr()
     assert "does not help" not in printed.err
     assert "truearm compensate" in printed.out + printed.err
+
+
+def test_scripts_are_told_by_kinds_what_is_wrong(folder, capsys):
+    table = pd.read_csv(folder / "other.csv")
+    table["q2"] += 0.01
+    table.to_csv(folder / "moved.csv", index=False)
+    assert main(["evaluate", "arm.calib", "moved.csv", "--json"]) == 0
+    printed = capsys.readouterr()
+    notices = json.loads(printed.out)["notices"]
+    assert "not_as_calibrated" in {notice["kind"] for notice in notices}
+    said = " ".join(printed.err.split())
+    assert all(" ".join(notice["message"].split()) in said for notice in notices)
 
 
 def test_kept_frames_judge_all_rows(capsys):

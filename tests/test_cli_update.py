@@ -87,7 +87,7 @@ def test_coarse_rows_of_an_arm_that_did_not_change_do_not_replace_its_calibratio
     assert revision is not None
     report = revision.report
     assert 1.1 * report["expected_before_mm"] < report["expected_after_mm"] < 1.0
-    assert any("is the more certain" in notice for notice in report["notices"])
+    assert any("is the more certain" in notice["message"] for notice in report["notices"])
     assert main(["update", "old.calib", "moved.csv", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["expected_before_mm"], told["expected_after_mm"]) == (None, None)

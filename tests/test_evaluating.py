@@ -36,7 +36,8 @@ def test_a_new_set_up_is_found_and_the_rest_judged(known):
     assert repr(found).startswith("<Evaluation: frame of 50 rows, 100 rows judged; nominal")
     errors = {name: entry.position.mean for name, entry in found.errors.items()}
     assert errors["variable"] < errors["constant"] < 0.2 * errors["nominal"]
-    assert list(found.to_dict()) == ["n_frame", "n_frame_poses", "n_judged", "n_judged_poses", "errors"]
+    keys = ["n_frame", "n_frame_poses", "n_judged", "n_judged_poses", "errors", "notices"]
+    assert list(found.to_dict()) == keys
 
 
 def test_rows_that_the_calibration_was_fitted_to_are_told(known):

@@ -69,7 +69,7 @@ def test_what_no_cell_says_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main([*words, "--missing", "N/A", "--missing", "-999"]) == 0
     out, err = capsys.readouterr()
     (notice,) = json.loads(out)["notices"]
-    assert notice.endswith("says what --missing -999 says")
+    assert notice["message"].endswith("says what --missing -999 says")
     assert "--missing -999" in err
 
 

@@ -19,7 +19,7 @@ from tests.remastered import (
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
 from truearm.doubts.of_results import LARGE_MM
-from truearm.errors import Notice
+from truearm.errors import Notice, in_json
 from truearm.fits.core_set import Selection
 from truearm.programs.notices import update_notices
 from truearm.reporting.facts import Facts
@@ -165,8 +165,8 @@ def test_a_noisier_device_moves_no_joint_of_an_unchanged_arm(known):
 def check_kept_notices(found, before):
     """What was warned of is in the file and in JSON, beside what was before."""
     assert found.calibration.notices == found.notices
-    assert found.to_dict()["notices"] == found.calibration.summary["notices"] == list(map(str, found.notices))
-    assert found.calibration.summary["update"]["former"]["notices"] == list(map(str, before.notices))
+    assert found.to_dict()["notices"] == found.calibration.summary["notices"] == in_json(found.notices)
+    assert found.calibration.summary["update"]["former"]["notices"] == in_json(before.notices)
 
 
 def test_a_gross_error_is_left_out_and_named(known):
@@ -284,7 +284,7 @@ def test_every_model_is_judged_at_poses_left_out_in_turn(known, moved):
         assert errors.statistics() == new.validation.holdout[name]
         assert new.validation.holdout[name].position.mean > new.validation.train[name].position.mean
     assert new.validation.holdout["variable"] == found.after
-    former = {**calibration.validation.to_dict(), "notices": list(map(str, calibration.notices))}
+    former = {**calibration.validation.to_dict(), "notices": in_json(calibration.notices)}
     assert new.summary["update"]["former"] == former
     fresh = remastered(arm, arm.poses(60, seed=77), SHIFT, seed=78, tool_mm=TOOL_MM)
     outside = ta.evaluate(new, fresh, frame_rows=15).errors["nominal"].position.mean

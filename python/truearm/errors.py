@@ -76,9 +76,9 @@ class Notice:
         return self.message
 
 
-def in_words(notices: Iterable[Notice]) -> list[str]:
-    """Notices as JSON values."""
-    return [str(notice) for notice in notices]
+def in_json(notices: Iterable[Notice]) -> list[dict[str, str]]:
+    """Notices as JSON values: what programs and what people read of each."""
+    return [{"kind": notice.kind, "message": notice.message} for notice in notices]
 
 
 def list_rows(rows: Iterable[int], noun: str = "row") -> str:

@@ -30,7 +30,7 @@ from truearm.doubts.of_results import NO_HELP, no_help
 from truearm.doubts.outliers import known_mean_mm
 from truearm.doubts.slips import MOSTLY
 from truearm.doubts.turning_sense import check_turns
-from truearm.errors import InputError, Notice, TruearmError, UsageError, list_names, rows_in_words
+from truearm.errors import InputError, Notice, TruearmError, UsageError, in_json, list_names, rows_in_words
 from truearm.fits.core_set import Selection, Use, rotations, select, select_fitted
 from truearm.fits.fitted_rows import known_rows
 from truearm.fits.fitting import Task, fit_setup
@@ -135,10 +135,11 @@ class Evaluation:
         return rows_in_words(self.n_judged, self.n_judged_poses)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON values, without the notices and the rows."""
+        """JSON values, without the rows."""
         errors = {name: found.to_dict() for name, found in self.errors.items()}
         counts = ("n_frame", "n_frame_poses", "n_judged", "n_judged_poses")
-        return {**{name: getattr(self, name) for name in counts}, "errors": errors}
+        numbers = {name: getattr(self, name) for name in counts}
+        return {**numbers, "errors": errors, "notices": in_json(self.notices)}
 
 
 class _Gross(NamedTuple):

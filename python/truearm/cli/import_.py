@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from truearm.cli import import_options as option
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest, warn
-from truearm.errors import UsageError, count_of, in_words, typed
+from truearm.errors import UsageError, count_of, in_json, typed
 from truearm.files import check_output, write_whole
 from truearm.units import COLUMN_ANGLE_UNITS, COLUMN_LENGTH_UNITS
 
@@ -122,7 +122,7 @@ def _tell(imported: "Imported", output: Path, *, as_json: bool) -> None:
                 "left_out": unused,
                 "rows_left_out": left_out,
                 "remarks": remarks,
-                "notices": in_words(notices),
+                "notices": in_json(notices),
             }
         )
         return

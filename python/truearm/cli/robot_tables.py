@@ -4,7 +4,7 @@ import numpy as np
 
 from truearm.cli.console import print_json, print_table, say, say_wrapped, warn
 from truearm.description.robot_checks import robot_notices
-from truearm.errors import Notice, count_of
+from truearm.errors import Notice, count_of, in_json
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
 
@@ -17,7 +17,7 @@ def show_robot(robot: Robot, *, as_json: bool) -> None:
     notices = robot_notices(robot)
     if as_json:
         content = {**robot.to_dict(), "units": {"length": "m", "angle": "rad"}}
-        print_json({**content, "notices": [str(notice) for notice in notices]})
+        print_json({**content, "notices": in_json(notices)})
         return
     say(f"{robot.name}, {count_of(robot.joint_count, 'joint')}, {robot.convention} Denavit-Hartenberg")
     say_wrapped(f"Source: {robot.source or 'not stated'}")

@@ -100,7 +100,7 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "determined": summary["identifiability"]["rank"],
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
-        "notices": [in_keys(notice) for notice in summary["notices"]],
+        "notices": [in_keys(notice["message"]) for notice in summary["notices"]],
         "undecided": in_keys(made.undecided),
         "grave": [in_keys(notice) for notice in made.grave],
     }

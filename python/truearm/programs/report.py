@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from truearm.errors import in_json
 from truearm.programs.listing import listed_target
 from truearm.programs.program import Listed, Program
 from truearm.programs.rewriting import Rewritten
@@ -38,7 +39,7 @@ def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
         "deviating": [
             {**_line(done.program, one.listed), "deviation_mm": one.deviation_mm} for one in done.deviating
         ],
-        "notices": [{"kind": notice.kind, "message": notice.message} for notice in done.notices],
+        "notices": in_json(done.notices),
     }
 
 

@@ -18,7 +18,7 @@ from truearm.reporting.parts import Part, Section, Table, Text
 def provenance(facts: Facts) -> Section:
     """Data, options, version, seed and time."""
     parts: list[Part] = [_origin(facts), _options(facts), *_outliers(facts)]
-    parts += [Text(f"Notice: {notice}") for notice in facts.summary["notices"]]
+    parts += [Text(f"Notice: {notice['message']}") for notice in facts.summary["notices"]]
     return Section("Provenance", parts)
 
 

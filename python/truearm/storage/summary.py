@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from truearm._core import ANGLE_ARM_M
-from truearm.errors import in_words
+from truearm.errors import in_json
 from truearm.fits.details import left_m
 from truearm.judgement.validation import mean_distance
 from truearm.types import AXES, Floats
@@ -48,7 +48,7 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         "data_sha256": calibration.data_hash,
         "version": calibration.version,
         "seconds": dict(calibration.seconds),
-        "notices": in_words(calibration.notices),
+        "notices": in_json(calibration.notices),
         "update": None if calibration.revision is None else dict(calibration.revision.report),
     }
 

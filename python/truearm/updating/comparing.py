@@ -16,7 +16,7 @@ from truearm.errors import (
     Notice,
     TruearmError,
     count_of,
-    in_words,
+    in_json,
 )
 from truearm.fits.core_set import Use
 from truearm.fits.fitted_rows import known_rows
@@ -171,7 +171,7 @@ class Update:
             "before": self.before.to_dict(),
             "after": self.after.to_dict(),
             **self._expected(),
-            "notices": in_words(self.notices),
+            "notices": in_json(self.notices),
         }
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from truearm.calibration import Calibration
 from truearm.certainty.standard_errors import of_covariance
 from truearm.certainty.uncertainty import UpdatedSpread
-from truearm.errors import Notice, in_words
+from truearm.errors import Notice, in_json
 from truearm.fits.details import ConstantDetails
 from truearm.fits.fitted_rows import TRAINED, FittedRows, farthest_m
 from truearm.fits.models import NOMINAL, ArmModel
@@ -50,7 +50,7 @@ def updated(
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
     fitted = judge(task, models, scene.data, scene.data)
     file = calibration.to_bytes() if calibration.file is None else calibration.file
-    former = {**calibration.validation.to_dict(), "notices": in_words(calibration.notices)}
+    former = {**calibration.validation.to_dict(), "notices": in_json(calibration.notices)}
     report = {**report, "former": former}
     revision = Revision.of(report, unknowns.directions, kept.covariance(found.covariance), file)
     errors = kept.carried(carried(scene, found))
@@ -96,7 +96,7 @@ def noted(new: Calibration, told: Mapping[str, Any], notices: tuple[Notice, ...]
     revision = new.revision
     if revision is None:
         return new
-    said = replace(revision, report={**revision.report, **told, "notices": in_words(notices)})
+    said = replace(revision, report={**revision.report, **told, "notices": in_json(notices)})
     return replace(new, notices=notices, revision=said)
 
 
