@@ -104,7 +104,7 @@ fn in_thousandths(value: f64) -> String {
 }
 
 /// What makes a target unreachable.
-const FAR: &str = ": the configuration is singular, or the target out of reach";
+const FAR: &str = ": the configuration is singular or nearly so, or the target out of reach";
 const MM: Unit = Unit { name: "mm", per_si: 1e3 };
 const DEG: Unit = Unit { name: "deg", per_si: 180.0 / std::f64::consts::PI };
 

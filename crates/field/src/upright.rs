@@ -3,7 +3,7 @@
 //! An arm on a wall whose file does not say so would have levers of the wrong heights. Which of two opposite directions is
 //! up does not matter: weights of the `sag` block have either sign.
 
-use truearm_bank::UPRIGHT;
+use truearm_bank::{InputKind, UPRIGHT};
 use truearm_kinematics::Cancel;
 
 use crate::FieldError;
@@ -34,12 +34,20 @@ const CHANCE: f64 = 6.0;
 const NO_LEVER: f64 = 1e-6;
 const REFIT: Limits = Limits { evaluations: 16, gain: 0.2 };
 
+/// Whether no joint that turns has a lever. Those of slides are the same at all poses of an arm whose axes all stand upright.
+fn no_axis_bears(upright: &Training) -> bool {
+    let joints: Vec<usize> = upright.geometry.joints().collect();
+    let turns = |joint: usize| upright.inputs[joint].kind == InputKind::Angle;
+    let of_pose = |pose| joints.iter().zip(upright.levers_of(pose)).filter(|&(&joint, _)| turns(joint));
+    (0..upright.pose_count()).flat_map(of_pose).all(|(_, lever)| lever.abs() < NO_LEVER)
+}
+
 /// The best of `found`, whose up is the z axis, and of the other directions, on the rows it was found on.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn contest_up(training: &Training, found: Found, cancel: &Cancel) -> Result<Found, FieldError> {
-    if training.clone().lifted(UPRIGHT)?.levers.iter().all(|lever| lever.abs() < NO_LEVER) {
+    if no_axis_bears(&training.clone().lifted(UPRIGHT)?) {
         return Ok(found);
     }
     let mut evaluations = found.evaluations;
