@@ -185,9 +185,9 @@ def readme_table(cases: dict[str, dict[str, Any]]) -> str:
     sources = ", ".join(f"{arm} {_linked(place)}" for arm, (_, place) in SOURCES.items())
     lines = [
         "Mean position error in mm on held-out poses that took no part in fitting, seed 7;",
-        "[95 %, maximum, other seeds and left-out regions](docs/reference/results.md). What set-ups moved",
-        "while they were measured is [taken out](docs/explanations/drift.md); the last column leaves it in.",
-        f"Measured by others and published: {sources}.",
+        "[95 %, maximum, other seeds and left-out regions](docs/reference/results.md). Drift of the set-up",
+        "during the session is [removed](docs/explanations/drift.md); the last column shows the error",
+        f"if it is not. Measured by others and published: {sources}.",
         "",
         "| data | nominal | constant | variable | drift left in |",
         "|---|---|---|---|---|",
