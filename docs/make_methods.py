@@ -38,7 +38,8 @@ what it gave on public ones, written by `docs/make_methods.py`. Every single res
 (`comparison-of-methods.jsonl.xz`).
 
 All methods are given the same positions of one target, the same training poses, 2000 at the most, and are
-judged on the same held-out poses, 1000 at the most. Shots of one visit to a pose are one row.
+judged on the same held-out poses, 1000 at the most. Shots of one visit to a pose are one row, and no pose
+is on both sides of a split.
 
 - **tails**: the 30 % of the rows with the lowest or the highest readings of a joint; the sides change from
   joint to joint and from seed to seed. **clusters**: three of ten clusters of joint space (k-means).
@@ -71,11 +72,6 @@ cross-validation on at most 500 of the training poses, of Gaussian processes by 
 then the method is fitted to all of them.
 
 In the tables of means the lowest is in bold, and so are those within 3 % of it.
-"""
-KNOWN = """In these tables rows of one pose may stand on both sides: of UR10 B, random rows, seed 7, 9.8 %
-of the held-out rows at 400 training poses and 27.8 % at all are of poses that also trained, where errors say
-how the arm repeats; of the other sets and splits next to none. `truearm study accuracy` holds out
-whole poses now.
 """
 BEHIND = """The table has the means that are more than 3 % above the lowest of the others, from 100 training
 poses on.
@@ -132,7 +128,6 @@ def page_of(summary: Mapping[str, Any]) -> str:
     parts = [
         HEAD,
         runs_of(summary),
-        KNOWN,
         f"![Mean held-out error over training poses]({PICTURE.name})",
         *standing,
         "## Where ours is behind",
