@@ -152,7 +152,7 @@ class InBox:
     high: ArrayLike
 
     def __post_init__(self) -> None:
-        _check_box(self.low, self.high)
+        _hold_box(self)
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -170,7 +170,7 @@ class InSphere:
     least_m: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_place(self.centre, "centre")
+        _hold_place(self, "centre")
         check_number(self.radius_m, "radius_m")
         check_number(self.least_m, "least_m")
 
@@ -197,8 +197,8 @@ class InCone:
     target_half_angle_rad: float = np.pi
 
     def __post_init__(self) -> None:
-        _check_place(self.apex, "apex")
-        _check_direction(self.axis, "axis")
+        _hold_place(self, "apex")
+        _hold_direction(self, "axis")
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -223,8 +223,8 @@ class LeastContactAngle:
     least_deg: float = LEAST_CONTACT_DEG
 
     def __post_init__(self) -> None:
-        _check_direction(self.normal, "normal")
-        _check_direction(self.pin, "pin")
+        _hold_direction(self, "normal")
+        _hold_direction(self, "pin")
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -250,7 +250,7 @@ class KeepOut:
     holds_on_ways: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_box(self.low, self.high)
+        _hold_box(self)
         check_number(self.margin_m, "margin_m")
         check_values(self, not_negative=("margin_m",))
 
@@ -315,32 +315,43 @@ def either(*rules: Rule) -> Rule:
     return any_of
 
 
-def _check_box(low: ArrayLike, high: ArrayLike) -> None:
-    """Raise UsageError unless these are the corners (3,) of a box."""
-    least, most = (as_numbers(side, what="the sides of a box") for side in (low, high))
+def _hold_box(rule: InBox | KeepOut) -> None:
+    """Make low and high the rule's own; raise UsageError unless they are the corners (3,) of a box."""
+    least, most = (as_numbers(side, what="the sides of a box") for side in (rule.low, rule.high))
     if least.shape != (3,) or most.shape != (3,) or not (least <= most).all():
         raise UsageError(
             f"a box from {least.tolist()} to {most.tolist()}",
             rule="x, y and z in m, the lowest and then the highest",
         )
+    _hold(rule, "low", least)
+    _hold(rule, "high", most)
 
 
-def _check_place(given: ArrayLike, name: str) -> None:
-    """Raise UsageError unless this is a place (3,)."""
-    place = as_numbers(given, what=f"the numbers of {name}")
+def _hold_place(rule: Rule, name: str) -> None:
+    """Make a place the rule's own numbers; raise UsageError unless it is one (3,)."""
+    place = as_numbers(getattr(rule, name), what=f"the numbers of {name}")
     if place.shape != (3,) or not np.isfinite(place).all():
         raise UsageError(
             f"{name} is {place.tolist()}", rule="A place has three finite numbers, x, y and z in m"
         )
+    _hold(rule, name, place)
 
 
-def _check_direction(given: ArrayLike, name: str) -> None:
-    """Raise UsageError unless this is a vector (3,) that leads somewhere."""
-    vector = as_numbers(given, what=f"the numbers of {name}")
+def _hold_direction(rule: Rule, name: str) -> None:
+    """Make a direction the rule's own numbers; raise UsageError unless it is a vector (3,) that leads
+    somewhere.
+    """
+    vector = as_numbers(getattr(rule, name), what=f"the numbers of {name}")
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise UsageError(
             f"{name} is {vector.tolist()}", rule="A direction has three finite numbers, not all of them zero"
         )
+    _hold(rule, name, vector)
+
+
+def _hold(rule: Rule, name: str, numbers: Floats) -> None:
+    """Give a rule numbers that do not change with the array that was given."""
+    object.__setattr__(rule, name, tuple(numbers.tolist()))
 
 
 def _angle(vectors: Floats, others: Floats) -> Floats:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truearm._core import Problem, Setup, linearise, setup_jacobian
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, read_only
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import task_of
 from truearm.errors import UsageError, WorkError, count_of, did_you_mean, list_names
@@ -43,7 +43,7 @@ class Candidates:
         known = required(self.calibration, Calibration, "the calibration").groups
         robot = self.calibration.robot
         rows, _ = as_rows(self.readings, robot.joint_count, what=f"joint readings of {robot.name}")
-        object.__setattr__(self, "readings", rows)
+        object.__setattr__(self, "readings", read_only(rows))
         if self.group is not None and self.group not in known:
             raise UsageError(f'there is no set-up "{self.group}"', rule=f"There are {list_names(known)}")
         names = self.calibration.options.features

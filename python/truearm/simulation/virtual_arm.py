@@ -272,7 +272,7 @@ class VirtualArm:
         """Denavit-Hartenberg joint values (n, N) with the errors of joints and what gives way."""
         imperfections = self.imperfections
         erring = readings + joint_errors(imperfections.joint_errors, readings, met.approach)
-        values = np.array(self.robot.joints_from_readings(erring))
+        values = self.robot.joints_from_readings(erring)
         if imperfections.deflection is None:
             if np.any(np.asarray(met.payload_kg) != 0.0):
                 raise InputError(
