@@ -1,6 +1,11 @@
 """What was given, or made, is not changed behind anyone's back, nor set to no effect."""
 
+import copy
+import pickle
+from dataclasses import FrozenInstanceError, replace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -64,3 +69,64 @@ def test_candidates_spaces_and_rules_keep_their_numbers(robot, calibration):
     np.testing.assert_array_equal(space.readings(np.zeros((1, 3)))[0][0, 3:], 0.2)
     np.testing.assert_array_equal([space.low, box.low, kept.low], 0.0)
     np.testing.assert_array_equal([space.high, box.high, kept.high], 1.0)
+
+
+def views_of(numbers):
+    """A read-only view of an array that is its owner's to change, and the array."""
+    owned = np.array(numbers)
+    view = owned[:]
+    view.flags.writeable = False
+    return view, owned
+
+
+def test_measurements_do_not_change_with_the_data_they_were_made_of(data):
+    readings, own_readings = views_of(data.readings)
+    sigma, own_sigma = views_of(np.full(len(data), 1e-4))
+    table = pd.DataFrame({"temperature_C": np.full(len(data), 20.0)})
+    made = replace(data, readings=readings, sigma_m=sigma, features=table)
+    before = made.hash()
+    own_readings[0], own_sigma[3] = 9.0, 5.0
+    table.loc[0, "temperature_C"] = 40.0
+    np.testing.assert_array_equal(made.readings, data.readings)
+    assert made.hash() == before
+
+
+def test_columns_of_a_table_become_measurements_own(data):
+    table = pd.DataFrame({"s": np.full(len(data), 1e-4)})
+    made = replace(data, sigma_m=table["s"].to_numpy())
+    table.loc[3, "s"] = 5.0
+    np.testing.assert_array_equal(made.sigma_m, 1e-4)
+
+
+def test_features_are_handed_out_as_copies(data):
+    made = replace(data, features=pd.DataFrame({"temperature_C": np.full(len(data), 20.0)}))
+    before = made.hash()
+    table = made.features
+    table["temperature_C"] += 273.15
+    made.features["temperature_C"].to_numpy(copy=True)[0] = 0.0
+    assert made.hash() == before
+    warmer = replace(made, features=table)
+    np.testing.assert_array_equal(warmer.features["temperature_C"], 293.15)
+    with pytest.raises(FrozenInstanceError):
+        made.features = table
+    assert pickle.loads(pickle.dumps(made)).hash() == copy.deepcopy(made).hash() == before
+
+
+def test_own_rows_are_kept_without_copies(data):
+    assert np.shares_memory(replace(data, readings=data.readings[:]).readings, data.readings)
+
+
+def test_what_a_calibration_says_by_name_cannot_be_set(calibration, data):
+    evaluation = ta.evaluate(calibration, data)
+    for said in (calibration.models, calibration.validation.holdout, evaluation.errors):
+        with pytest.raises(TypeError, match="read-only"):
+            said["constant"] = said["nominal"]
+        with pytest.raises(TypeError, match="read-only"):
+            said.pop("constant")
+    with pytest.raises(ValueError, match="read-only"):
+        calibration.held.errors["constant"].position[:] = 0.0
+    for again in (copy.deepcopy, lambda said: pickle.loads(pickle.dumps(said))):
+        found = again(calibration.validation)
+        assert found == calibration.validation
+        with pytest.raises(TypeError, match="read-only"):
+            found.holdout.clear()

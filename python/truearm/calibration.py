@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truearm._core import Chain, Conservative
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, hold_read_only
 from truearm.certainty.conservative import conservative_of
 from truearm.certainty.uncertainty import ConstantSpread, SetupPlace, Spread, UpdatedSpread, VariableSpread
+from truearm.certainty.variation import variation_std
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
 from truearm.fits.core_set import Selection
@@ -98,6 +99,9 @@ class Calibration:
     fitted_spread: Spread | None = None
     revision: Revision | None = None
     file: bytes | None = None
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "models", "seconds")
 
     @classmethod
     def load(cls, path: str | Path) -> "Calibration":
@@ -401,19 +405,7 @@ class Calibration:
             UsageError: If there is no such parameter.
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
-        (rows, single), asked = self._readings(q), words(names, "names")
-        count = AXES * -(-len(asked) // AXES)
-        picked = np.zeros((len(rows), count, self.arm.table.size))
-        for k, name in enumerate(asked):
-            picked[:, k, self.arm.candidates.column(name)] = 1.0
-        if not len(rows):
-            return np.empty((0, len(asked)))
-        together = self.spread.joint(self.field_inputs(rows, features), picked)
-        covariance = np.einsum("ikjk->kij", together.reshape(len(rows), count, len(rows), count))
-        centred = covariance - covariance.mean(axis=1, keepdims=True)
-        variances = np.einsum("kii->ik", centred - centred.mean(axis=2, keepdims=True))
-        found = np.asarray(np.sqrt(np.maximum(variances[:, : len(asked)], 0.0)))
-        return found[0] if single else found
+        return variation_std(self, q, words(names, "names"), features)
 
     def _std(self, q: ArrayLike, end: Endpoint, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
