@@ -53,7 +53,7 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
     check_count(candidates, count)
     where = workspace_of(candidates, workspace)
     rows, variance = choose_informative(candidates.covariance(where), candidates.core(), count)
-    expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
+    expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(where))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
 
 
