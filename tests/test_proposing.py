@@ -62,7 +62,7 @@ def test_the_expected_error_is_that_of_one_gaussian_update(proposed):
 
 
 def test_a_workspace_of_one_pose_may_be_its_readings(known, proposed):
-    arm, calibration = known
+    calibration = known[1]
     candidates, workspace, _ = proposed
     alone, one = next_poses(candidates, workspace[0], 2), next_poses(candidates, workspace[:1], 2)
     np.testing.assert_array_equal(alone.expected_mm, one.expected_mm)

@@ -209,7 +209,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -218,7 +218,7 @@ class Calibration:
         Args:
             q: Readings.
             tool: Transform (4, 4) from flange to tool, or a point (3,) in the flange frame.
-            group: Name of the set-up whose world is meant.
+            group: Name of the set-up whose world is meant, of one with a number for its name also that.
             target: Measured target, from 1; by default the first that the set-up measured.
             features: Features by name.
 
@@ -237,7 +237,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -276,7 +276,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -295,7 +295,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -465,12 +465,12 @@ class Calibration:
         inputs = self.field_inputs(rows, features)
         return np.ascontiguousarray(inputs[:, : self.robot.joint_count]), self.model.parameters(inputs)
 
-    def _endpoint(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
+    def _endpoint(self, tool: ArrayLike | None, group: str | int | None, target: int | None) -> Endpoint:
         if group is None and target is None:
             return Endpoint(at_tool(self.robot, tool))
         return at_target(self, tool, group, target)
 
-    def _oriented(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
+    def _oriented(self, tool: ArrayLike | None, group: str | int | None, target: int | None) -> Endpoint:
         """The same where its orientation is asked for."""
         end = self._endpoint(tool, group, target)
         if end.has_orientation:
