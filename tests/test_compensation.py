@@ -275,6 +275,8 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
         (lambda c: ta.Compensator(c).joints(PATH, tool=np.diag([2.0, 1, 1, 1])), "the tool"),
         (lambda c: ta.Compensator(c).correct([0.0] * 5), "5 readings"),
         (lambda c: ta.Compensator(c).correct("home"), "texts were given"),
+        (lambda c: ta.Compensator(c).correct([np.nan] * 6), "NaN or infinite values"),
+        (lambda c: ta.Compensator(c).correct([0.0, np.inf, *[0.0] * 4]), "NaN or infinite values"),
         (lambda c: ta.Compensator(c).poses(np.zeros((2, 3)), PATH[0]), "\\(n, 4, 4\\)"),
         (lambda c: ta.Compensator(c).poses(np.ones((1, 4, 4)), PATH[0]), "last row"),
         (lambda c: ta.Compensator(c).poses(np.diag([2.0, 1, 1, 1]), PATH[0]), "not rigid in row 0"),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Corrector, Solver
-from truearm.arrays import as_numbers, as_rows, as_transforms
+from truearm.arrays import as_numbers, as_rows, as_transforms, check_finite
 from truearm.calibration import Calibration
 from truearm.errors import InputError, WorkError, count_of
 from truearm.fits.endpoints import at_tool
@@ -34,6 +34,8 @@ from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 TO_SHOWN: Final = np.array([MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE])
 TOOLS_KEPT: Final = 16
+NOT_FINITE: Final = 1
+"""Code of a refusal for a reading that is no finite number, see Refusal."""
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,10 @@ class Compensator:
         except ValueError as error:
             raise InputError(str(error), where="joint readings") from None
         if refusal is not None:
-            raise WorkError(refusal[1], where="waypoint")
+            code, reason = refusal
+            if code == NOT_FINITE:
+                check_finite(readings[None], what="joint readings")
+            raise WorkError(reason, where="waypoint")
         return corrected
 
     def _tool(self, tool: ArrayLike | None) -> Floats:
