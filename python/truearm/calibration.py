@@ -199,9 +199,22 @@ class Calibration:
         return summarise(self)
 
     def parameters(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
-        """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading."""
+        """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading.
+
+        With frame "world" the base is corrected too: they go with `base`, and not with the robot's own.
+        """
         rows, single = self._readings(q)
         found = self.model.parameters(self.field_inputs(rows, features))[:, self.arm.links]
+        return found[0] if single else found
+
+    def base(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
+        """Transforms (n, 4, 4) before the first link, or (4, 4) for one reading, m.
+
+        They are the robot's `base`, but with frame "world": there the base is found like a link, and varies
+        in the paper's schemes alone. `replace(robot, table=parameters, base=base)` is the arm at a reading.
+        """
+        rows, single = self._readings(q)
+        found = self.arm.bases(self.model.parameters(self.field_inputs(rows, features)))
         return found[0] if single else found
 
     def position(
@@ -246,7 +259,7 @@ class Calibration:
         Raises:
             WorkError: If the target, or its orientation, was not measured in the set-up.
         """
-        end = self._oriented(tool, group, target)
+        end = self._endpoint(tool, group, target).oriented()
         rows, single = self._readings(q)
         poses = self._chain(end.flange_from_end).pose(*self._at(rows, features))
         if end.world_from_base is not None:
@@ -306,7 +319,7 @@ class Calibration:
         Raises:
             WorkError: If the target, or its orientation, was not measured in the set-up.
         """
-        return self._std(q, self._oriented(tool, group, target), features, pose=True)
+        return self._std(q, self._endpoint(tool, group, target).oriented(), features, pose=True)
 
     def solve(
         self,
@@ -469,17 +482,6 @@ class Calibration:
         if group is None and target is None:
             return Endpoint(at_tool(self.robot, tool))
         return at_target(self, tool, group, target)
-
-    def _oriented(self, tool: ArrayLike | None, group: str | int | None, target: int | None) -> Endpoint:
-        """The same where its orientation is asked for."""
-        end = self._endpoint(tool, group, target)
-        if end.has_orientation:
-            return end
-        raise WorkError(
-            "the orientation of the target on the tool is not known",
-            rule="It was not measured",
-            way_out="Ask for its position, or give a tool",
-        )
 
     def _chain(self, flange_from_end: Floats) -> Chain:
         return self.arm.chain(self.robot.flange @ flange_from_end)

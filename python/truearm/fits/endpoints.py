@@ -38,6 +38,20 @@ class Endpoint:
     group: int | None = None
     target: int | None = None
 
+    def oriented(self) -> "Endpoint":
+        """This one, of which the orientation is asked for.
+
+        Raises:
+            WorkError: If that is not known.
+        """
+        if self.has_orientation:
+            return self
+        raise WorkError(
+            "the orientation of the target on the tool is not known",
+            rule="It was not measured",
+            way_out="Ask for its position, or give a tool",
+        )
+
     def motions(self, flanges: Floats, *, pose: bool) -> Floats:
         """How the end moves with base and tool as the device saw them, see SetupPlace.motion.
 
