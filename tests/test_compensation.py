@@ -143,6 +143,8 @@ def test_the_papers_task_moves_the_first_three_joints(constant, robot):
     found = ta.Compensator(constant, task="position", moving=(1, 2, 3), limits=OPEN).joints(PATH)
     assert found.refusals == ()
     assert np.array_equal(found.q[:, 3:], PATH[:, 3:])
+    by_array = ta.Compensator(constant, task="position", moving=np.array([1, 2, 3]), limits=OPEN)
+    assert by_array.moving == (1, 2, 3)
     assert constant.position(found.q) == pytest.approx(robot.position(PATH), abs=MET_M)
 
 

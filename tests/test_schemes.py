@@ -84,7 +84,9 @@ def test_outliers_of_a_scheme_are_those_of_its_constants(data, arm, shots):
         calibrate(arm.robot, spoilt, model=model, **QUICK) for model in ("regions", "constant")
     )
     rows, theirs = found.rows, constant.rows
-    assert {entry["row"] for entry in found.rows.outliers()} == {8, 91}
+    assert rows is not None
+    assert theirs is not None
+    assert {entry["row"] for entry in rows.outliers()} == {8, 91}
     np.testing.assert_array_equal(rows.score, theirs.score)
     far = rows.score > 1.0
     np.testing.assert_array_equal(rows.distance_m[far], theirs.distance_m[far])

@@ -1,6 +1,7 @@
 """Set-ups that share an arm: how few rows each may have, and what each measured."""
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -112,9 +113,11 @@ def test_pairs_and_anchors_are_told_apart_by_all_digits(arm):
     wire = arm.measure_table(arm.poses(4)).drop(columns=["x", "y", "z"]).assign(distance=1.0)
     number = 1764400000000000001
     anchors = ta.Measurements.from_dataframe(wire.assign(anchor=[number, number, number + 1, number + 1]))
+    assert anchors.anchor is not None
     assert len(set(anchors.anchor)) == 2
     gaps = pd.array([number, number, number + 1, number + 1], dtype="Int64")
     pairs = ta.Measurements.from_dataframe(wire.assign(pair=gaps))
+    assert pairs.pair is not None
     assert pairs.pair.tolist() == [str(number)] * 2 + [str(number + 1)] * 2
 
 
@@ -131,11 +134,12 @@ def test_a_set_up_with_a_number_for_its_name_may_be_asked_for_by_it(arm):
     data = ta.Measurements.from_dataframe(arm.measure_table(arm.poses(60)).assign(group=1))
     found, q = ta.calibrate(arm.robot, data, model="constant"), arm.poses(2, seed=3)
     assert found.groups == ("1",)
-    for number in (1, np.int64(1)):
+    numbers: list[Any] = [1, np.int64(1)]
+    for number in numbers:
         np.testing.assert_array_equal(found.position(q, group=number), found.position(q, group="1"))
         assert Candidates(found, q, group=number).group == "1"
     for ask in (lambda: found.position(q, group=2), lambda: Candidates(found, q, group=2)):
         with pytest.raises(ta.UsageError, match='there is no set-up "2". The calibration knows "1"'):
             ask()
     with pytest.raises(ta.UsageError, match=r"group is 1.5. It must be a text"):
-        found.position(q, group=1.5)
+        found.position(q, group=cast("Any", 1.5))

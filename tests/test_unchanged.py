@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import FrozenInstanceError, replace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -118,7 +119,8 @@ def test_own_rows_are_kept_without_copies(data):
 
 def test_what_a_calibration_says_by_name_cannot_be_set(calibration, data):
     evaluation = ta.evaluate(calibration, data)
-    for said in (calibration.models, calibration.validation.holdout, evaluation.errors):
+    told: list[Any] = [calibration.models, calibration.validation.holdout, evaluation.errors]
+    for said in told:
         with pytest.raises(TypeError, match="read-only"):
             said["constant"] = said["nominal"]
         with pytest.raises(TypeError, match="read-only"):
@@ -130,3 +132,32 @@ def test_what_a_calibration_says_by_name_cannot_be_set(calibration, data):
         assert found == calibration.validation
         with pytest.raises(TypeError, match="read-only"):
             found.holdout.clear()
+
+
+def test_the_errors_of_a_virtual_arm_are_as_drawn(robot):
+    arm = VirtualArm(robot, seed=1)
+    with pytest.raises(ValueError, match="read-only"):
+        arm.errors[2, 2] += 0.01
+    with pytest.raises(AttributeError, match="errors"):
+        cast("Any", arm).errors = np.zeros((6, 5))
+
+
+class OwnRobot(ta.Robot):
+    """A user's own kind of robot."""
+
+
+class OwnMeasurements(ta.Measurements):
+    """A user's own kind of measurements."""
+
+
+class OwnCalibration(ta.Calibration):
+    """A user's own kind of calibration."""
+
+
+def test_own_kinds_are_sent_and_copied_as_what_they_are(data, calibration, tmp_path):
+    calibration.save(tmp_path / "arm.calib")
+    own = OwnCalibration.load(tmp_path / "arm.calib")
+    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own):
+        for again in (copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))):
+            assert type(again(thing)) is type(thing)
+    assert copy.deepcopy(own).to_bytes() == calibration.to_bytes()

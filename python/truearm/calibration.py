@@ -136,7 +136,7 @@ class Calibration:
     def __reduce__(self) -> tuple[object, ...]:
         content = self.to_bytes()
         file = content if self.file == content else self.file
-        return _restored, (content, dict(self.seconds), file)
+        return _restored, (type(self), content, dict(self.seconds), file)
 
     def without_rows(self) -> "Calibration":
         """This one as a file without the measurements holds it, with the bounds of the standard deviation."""
@@ -487,7 +487,9 @@ class Calibration:
         return self.arm.chain(self.robot.flange @ flange_from_end)
 
 
-def _restored(content: bytes, seconds: Mapping[str, float], file: bytes | None) -> Calibration:
+def _restored(
+    kind: type[Calibration], content: bytes, seconds: Mapping[str, float], file: bytes | None
+) -> Calibration:
     """A calibration that was pickled: what its file holds, and how long its fits took."""
-    found = Calibration.from_bytes(content, where="a pickled calibration")
+    found = kind.from_bytes(content, where="a pickled calibration")
     return replace(found, seconds=seconds, file=file)

@@ -29,7 +29,7 @@ from truearm.solving import (
     moving_joints,
     plain_model,
 )
-from truearm.types import Floats
+from truearm.types import Floats, Whole
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 TO_SHOWN: Final = np.array([MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE])
@@ -108,7 +108,7 @@ class Compensator:
         *,
         programming: Robot | None = None,
         task: Task = "pose",
-        moving: Sequence[int] | None = None,
+        moving: Sequence[int] | Whole | None = None,
         limits: Limits | None = None,
         features: Mapping[str, float] | None = None,
     ) -> None:
@@ -330,7 +330,7 @@ def _compensator(
     calibration: Calibration,
     programming: Robot,
     task: Task,
-    moving: Sequence[int] | None,
+    moving: Sequence[int] | Whole | None,
     limits: Limits,
     features: Mapping[str, float],
 ) -> Compensator:

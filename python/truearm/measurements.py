@@ -115,7 +115,7 @@ class Measurements:
         return f"<Measurements: {size}; {list_names(self.groups[:GROUPS_SHOWN])}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Measurements, tuple(getattr(self, field.name) for field in fields(self))
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     def _check_length(self, name: str, value: Texts | Floats | pd.DataFrame) -> None:
         if len(value) != len(self):

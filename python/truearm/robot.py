@@ -195,7 +195,7 @@ class Robot(RobotData):
         return f"<Robot {self.name}: {self.joint_count} joints, {self.convention} Denavit-Hartenberg>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Robot.from_dict, (self.to_dict(),)
+        return type(self).from_dict, (self.to_dict(),)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Robot) and self.to_dict() == other.to_dict()
