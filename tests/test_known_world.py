@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_parameters_and_base_are_the_arm_that_predicts(model):
     for arm in (VirtualArm.paper(seed=2, imperfections=wavy), VirtualArm(UR10, seed=2, imperfections=wavy)):
         arm.world_from_base = np.eye(4)
         data = arm.measure(arm.poses(120))
-        more = {"most_regions": 4} if model == "regions" else {}
+        more: dict[str, Any] = {"most_regions": 4} if model == "regions" else {}
         found = ta.calibrate(arm.robot, data, frame="world", model=model, **more)
         q = arm.poses(10, seed=9)
         assert min(errors_of_links_alone(found, q)) > 2e-4
@@ -78,6 +79,7 @@ def test_parameters_and_base_are_the_arm_that_predicts(model):
             words = re.search(
                 r"the base is (.*) mm from .* of world, turned by the rotation vector (.*?) mrad", text
             )
+            assert words is not None
             moved, turned = (np.array(part.split(", "), dtype=float) for part in words.groups())
             base = found.base(q[0])
             np.testing.assert_allclose(moved, 1e3 * (base - arm.robot.base)[:3, 3], atol=1e-3)
