@@ -1,6 +1,7 @@
 """The C library reads what Python writes, and computes the same."""
 
 import ctypes
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -190,8 +191,8 @@ def test_a_base_that_is_corrected_is_read(library, tmp_path):
 def test_features_are_passed(data, library, tmp_path, name):
     robot, measured = data
     rng = np.random.default_rng(0)
-    warm = measured.select(np.arange(len(measured)))
-    warm.features[name] = rng.uniform(18.0, 30.0, len(warm))
+    values = rng.uniform(18.0, 30.0, len(measured))
+    warm = replace(measured, features=measured.features.assign(**{name: values}))
     calibration = ta.calibrate(robot, warm, features=(name,))
     calibration.save(tmp_path / "arm.calib", with_rows=False)
     (sag,) = (block for block in calibration.summary["blocks"] if block["name"] == "sag")

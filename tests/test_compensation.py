@@ -143,6 +143,8 @@ def test_the_papers_task_moves_the_first_three_joints(constant, robot):
     found = ta.Compensator(constant, task="position", moving=(1, 2, 3), limits=OPEN).joints(PATH)
     assert found.refusals == ()
     assert np.array_equal(found.q[:, 3:], PATH[:, 3:])
+    by_array = ta.Compensator(constant, task="position", moving=np.array([1, 2, 3]), limits=OPEN)
+    assert by_array.moving == (1, 2, 3)
     assert constant.position(found.q) == pytest.approx(robot.position(PATH), abs=MET_M)
 
 
@@ -275,6 +277,8 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
         (lambda c: ta.Compensator(c).joints(PATH, tool=np.diag([2.0, 1, 1, 1])), "the tool"),
         (lambda c: ta.Compensator(c).correct([0.0] * 5), "5 readings"),
         (lambda c: ta.Compensator(c).correct("home"), "texts were given"),
+        (lambda c: ta.Compensator(c).correct([np.nan] * 6), "NaN or infinite values"),
+        (lambda c: ta.Compensator(c).correct([0.0, np.inf, *[0.0] * 4]), "NaN or infinite values"),
         (lambda c: ta.Compensator(c).poses(np.zeros((2, 3)), PATH[0]), "\\(n, 4, 4\\)"),
         (lambda c: ta.Compensator(c).poses(np.ones((1, 4, 4)), PATH[0]), "last row"),
         (lambda c: ta.Compensator(c).poses(np.diag([2.0, 1, 1, 1]), PATH[0]), "not rigid in row 0"),

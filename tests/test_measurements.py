@@ -394,8 +394,9 @@ def test_arrays_of_the_caller_stay_the_callers() -> None:
     arrays["readings"][:], features["new"], features["load"] = 9.0, 1.0, 2.0
     assert made.hash() == data.hash()
     other = replace(made, group=np.full(len(data), "b"))
-    other.features["new"] = 1.0
-    assert list(made.features) == ["load"]
+    handed_out = other.features
+    handed_out["new"] = 1.0
+    assert list(made.features) == list(other.features) == ["load"]
     with pytest.raises(InputError, match="features: 2 rows. There are 6 readings"):
         replace(data, features=pd.DataFrame({"load": [1.0, 2.0]}))
 

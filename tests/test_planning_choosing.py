@@ -56,6 +56,16 @@ def test_indices_are_in_one_order():
     assert list(choice.after) == list(choice.before)
 
 
+def test_a_pool_may_be_of_single_precision_or_a_list():
+    arm, drawn = IdentifiedArm(Robot.load("ur10")), np.random.default_rng(0).uniform(-1, 1, (40, 6))
+    single = drawn.astype(np.float32)
+    chosen = choose(arm, single, 20, given=single[:2])
+    again = choose(arm, single.tolist(), 20, given=single[:2].tolist())
+    np.testing.assert_array_equal(again.rows, chosen.rows)
+    with pytest.raises(InputError, match=r"joint readings of UR10 have shape \(40, 5\)"):
+        choose(arm, drawn[:, :5], 20)
+
+
 @pytest.mark.parametrize("criterion", ["o1", "o3", "d"])
 def test_an_index_is_not_lowered(pool, criterion):
     found = choose(WORLD, pool, 15, ChoiceOptions(criterion=criterion, names=PAPER_PARAMETERS))

@@ -1,6 +1,6 @@
 """Spaces lead to poses and back, and rules say which of them can be measured."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -28,6 +28,7 @@ from truearm.planning.accessibility import (
     standing_links,
 )
 from truearm.planning.configurations import Configuration
+from truearm.planning.joint_ways import JointWays
 from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
 from truearm.planning.spaces import CartesianSpace, JointSpace, SphericalSpace
 from truearm.robot import Robot
@@ -252,6 +253,55 @@ def test_a_users_own_rule_and_its_shape():
     assert kept.tolist() == [False, True, True, True]
     with pytest.raises(InputError, match="shape"):
         accessible(RV_M2, readings, [lambda _: np.array([True])])
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        lambda places: places.point[:, 2] - 0.2,
+        lambda places: ~(places.point[:, 2] < 0.2).astype(int),
+        lambda places: np.full(len(places.point), np.nan),
+        lambda places: np.full(len(places.point), None),
+        lambda places: np.full((len(places.point), 1), fill_value=True),
+    ],
+    ids=["distances", "inverted integers", "nan", "none", "column"],
+)
+def test_a_rule_that_does_not_say_true_or_false_allows_nothing(answer):
+    class ByHand:
+        holds_on_ways = True
+
+        def __call__(self, places: Places) -> Any:
+            return answer(places)
+
+    by_hand, readings = ByHand(), np.zeros((4, 5))
+    words = r"ByHand: a rule .* answered with .*true or false of each of 4 poses, as booleans \(4,\)"
+    for rules in ([by_hand], [either(by_hand, AboveFloor(9.0))]):
+        with pytest.raises(InputError, match=words):
+            accessible(RV_M2, readings, rules)
+    with pytest.raises(InputError, match="ByHand: a rule"):
+        JointWays(RV_M2, [by_hand], [RV_M2.tool]).clear(readings)
+
+
+def test_a_rule_may_answer_with_a_list():
+    def in_front(places: Places) -> Any:
+        return [bool(x > 0.0) for x in places.point[:, 0]]
+
+    readings = np.zeros((3, 5))
+    readings[:, 0] = np.deg2rad([-60.0, 0.0, 60.0])
+    meant = RV_M2.position(readings)[:, 0] > 0.0
+    assert 0 < meant.sum() < 3
+    np.testing.assert_array_equal(accessible(RV_M2, readings, [in_front]), meant)
+    none = accessible(RV_M2, readings, [AboveFloor(9.0), in_front])
+    np.testing.assert_array_equal(none, [False, False, False])
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 0.0), 1.0, (np.nan, 0.0, 0.0)])
+def test_places_of_rules_are_three_numbers(wrong):
+    for rule in (lambda: InSphere(wrong, 1.0), lambda: InCone(wrong, (0.0, 0.0, 1.0), 0.1)):
+        with pytest.raises(UsageError, match="(centre|apex) is .*A place has three finite numbers"):
+            rule()
+    with pytest.raises(UsageError, match="radius_m is '1'. It must be a number"):
+        InSphere((0.0, 0.0, 0.0), cast("Any", "1"))
 
 
 def test_poses_to_judge_may_be_a_list_or_a_table():

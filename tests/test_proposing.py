@@ -61,6 +61,16 @@ def test_the_expected_error_is_that_of_one_gaussian_update(proposed):
     np.testing.assert_allclose(found.expected_mm[1], wanted, rtol=1e-9)
 
 
+def test_a_workspace_of_one_pose_may_be_its_readings(known, proposed):
+    calibration = known[1]
+    candidates, workspace, _ = proposed
+    alone, one = next_poses(candidates, workspace[0], 2), next_poses(candidates, workspace[:1], 2)
+    np.testing.assert_array_equal(alone.expected_mm, one.expected_mm)
+    group = calibration.groups[0]
+    std = calibration.position_std(workspace[0], group=group)
+    assert alone.expected_mm[0] == pytest.approx(1e3 * np.linalg.norm(std), rel=1e-6)
+
+
 def test_what_is_expected_of_an_update_comes_true(known):
     arm, _ = known
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40), orientation=True), model="constant")

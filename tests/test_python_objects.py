@@ -287,7 +287,7 @@ WRONG = {
         lambda r, d, c: find_tool(c, d, orientation="down"),
         "the entries of the orientation are not real numbers",
     ),
-    "a set-up by number": (lambda r, d, c: c.position(d.readings, group=0), 'there is no group "0"'),
+    "a set-up by number": (lambda r, d, c: c.position(d.readings, group=0), 'there is no set-up "0"'),
     "features in a list": (lambda r, d, c: c.position(d.readings, features=[1]), "features are of type list"),
     "poses for a calibration": (
         lambda r, d, c: next_poses(c, d.readings, 5),

@@ -54,6 +54,45 @@ def test_what_a_scheme_leaves_is_its_own(calibrations, data, arm):
     assert with_sigma.summary["noise_mm"] == pytest.approx(np.sqrt(rms**2 / 3.0 - 0.01**2))
 
 
+def missed_m(found):
+    """How far each row's point (n,) is from where a calibration predicts it, by its predictions alone."""
+    data = found.rows.data
+    return np.linalg.norm(found.position(data.readings, group=found.groups[0]) - data.targets[:, 0], axis=1)
+
+
+@pytest.mark.parametrize("model", ["regions", "fcmac"])
+def test_rows_of_a_scheme_are_measured_minus_predicted(calibrations, model):
+    found = calibrations[model]
+    rows, left = found.rows, missed_m(found)
+    constant = replace(found, options=replace(found.options, model="constant"))
+    assert left.mean() < 0.9 * missed_m(constant).mean()
+    base_from_world = found.model.setup.frames[0, :3, :3].T
+    seen = rows.data.targets[:, 0] - found.position(rows.data.readings, group=found.groups[0])
+    np.testing.assert_allclose(rows.residual, seen @ base_from_world.T, rtol=0.0, atol=1e-12)
+    clear = rows.score <= 1.0
+    assert clear.sum() > 400
+    np.testing.assert_allclose(rows.distance_m[clear], left[clear], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("shots", [1, 2])
+def test_outliers_of_a_scheme_are_those_of_its_constants(data, arm, shots):
+    targets = np.array(data.targets)
+    targets[[7, 90]] += [0.0, 0.03, 0.0]
+    spoilt = replace(data, targets=targets)
+    spoilt = spoilt.concatenate([spoilt] * shots)
+    found, constant = (
+        calibrate(arm.robot, spoilt, model=model, **QUICK) for model in ("regions", "constant")
+    )
+    rows, theirs = found.rows, constant.rows
+    assert rows is not None
+    assert theirs is not None
+    assert {entry["row"] for entry in rows.outliers()} == {8, 91}
+    np.testing.assert_array_equal(rows.score, theirs.score)
+    far = rows.score > 1.0
+    np.testing.assert_array_equal(rows.distance_m[far], theirs.distance_m[far])
+    np.testing.assert_allclose(rows.distance_m[~far], missed_m(found)[~far], rtol=0.0, atol=1e-12)
+
+
 def test_predictions_are_those_of_the_scheme(calibrations, arm):
     found = calibrations["fcmac"]
     assert found.model_name == "fcmac"

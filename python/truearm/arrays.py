@@ -1,11 +1,13 @@
 """Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError, list_names, list_rows
+from truearm.fixed_dict import FixedDict
 from truearm.named_values import check_readings
 
 if TYPE_CHECKING:
@@ -148,19 +150,34 @@ def frozen(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
 
 
 def read_only(values: NDArray[Any]) -> NDArray[Any]:
-    """An array that nothing changes: itself where it is read-only, else a copy."""
-    if not values.flags.writeable:
+    """An array that nothing changes: itself where it and what it is a view of are read-only, else a copy."""
+    if _is_fixed(values):
         return values
     copied = values.copy()
     copied.flags.writeable = False
     return copied
 
 
+def _is_fixed(values: NDArray[Any]) -> bool:
+    """Whether an array, and the array whose memory it is a view of, are read-only."""
+    seen: object = values
+    while isinstance(seen, np.ndarray) and not seen.flags.writeable:
+        if seen.flags.owndata:
+            return True
+        seen = seen.base
+    return False
+
+
 def hold_read_only(record: object, *names: str) -> None:
-    """Make arrays of a frozen dataclass, those that are not None, its own and read-only, in __post_init__."""
+    """Make a frozen dataclass's arrays and dicts, those that are not None, its own and read-only.
+
+    It is called in __post_init__.
+    """
     for name in names:
-        if (values := getattr(record, name)) is not None:
-            object.__setattr__(record, name, read_only(values))
+        values = getattr(record, name)
+        if values is not None:
+            held = FixedDict(values) if isinstance(values, Mapping) else read_only(values)
+            object.__setattr__(record, name, held)
 
 
 def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64], bool]:

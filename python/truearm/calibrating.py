@@ -223,7 +223,7 @@ def _fitted_rows(
 ) -> FittedRows:
     """The rows of the last fit as they were measured; `given` are all rows, which of them, and the split."""
     data, order, split = given
-    rows = FittedRows.of(final, sides(len(data), split)[order], task.selection)
+    rows = FittedRows.of(task, final, sides(len(data), split)[order])
     rows = judged_unbent(task, rows, final)
     if not drift:
         return rows

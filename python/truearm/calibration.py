@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truearm._core import Chain, Conservative
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, hold_read_only
 from truearm.certainty.conservative import conservative_of
 from truearm.certainty.uncertainty import ConstantSpread, SetupPlace, Spread, UpdatedSpread, VariableSpread
+from truearm.certainty.variation import variation_std
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
 from truearm.fits.core_set import Selection
@@ -99,6 +100,9 @@ class Calibration:
     revision: Revision | None = None
     file: bytes | None = None
 
+    def __post_init__(self) -> None:
+        hold_read_only(self, "models", "seconds")
+
     @classmethod
     def load(cls, path: str | Path) -> "Calibration":
         """Read a calibration file.
@@ -132,7 +136,7 @@ class Calibration:
     def __reduce__(self) -> tuple[object, ...]:
         content = self.to_bytes()
         file = content if self.file == content else self.file
-        return _restored, (content, dict(self.seconds), file)
+        return _restored, (type(self), content, dict(self.seconds), file)
 
     def without_rows(self) -> "Calibration":
         """This one as a file without the measurements holds it, with the bounds of the standard deviation."""
@@ -195,9 +199,22 @@ class Calibration:
         return summarise(self)
 
     def parameters(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
-        """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading."""
+        """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading.
+
+        With frame "world" the base is corrected too: they go with `base`, and not with the robot's own.
+        """
         rows, single = self._readings(q)
         found = self.model.parameters(self.field_inputs(rows, features))[:, self.arm.links]
+        return found[0] if single else found
+
+    def base(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
+        """Transforms (n, 4, 4) before the first link, or (4, 4) for one reading, m.
+
+        They are the robot's `base`, but with frame "world": there the base is found like a link, and varies
+        in the paper's schemes alone. `replace(robot, table=parameters, base=base)` is the arm at a reading.
+        """
+        rows, single = self._readings(q)
+        found = self.arm.bases(self.model.parameters(self.field_inputs(rows, features)))
         return found[0] if single else found
 
     def position(
@@ -205,7 +222,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -214,7 +231,7 @@ class Calibration:
         Args:
             q: Readings.
             tool: Transform (4, 4) from flange to tool, or a point (3,) in the flange frame.
-            group: Name of the set-up whose world is meant.
+            group: Name of the set-up whose world is meant, of one with a number for its name also that.
             target: Measured target, from 1; by default the first that the set-up measured.
             features: Features by name.
 
@@ -233,7 +250,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -242,7 +259,7 @@ class Calibration:
         Raises:
             WorkError: If the target, or its orientation, was not measured in the set-up.
         """
-        end = self._oriented(tool, group, target)
+        end = self._endpoint(tool, group, target).oriented()
         rows, single = self._readings(q)
         poses = self._chain(end.flange_from_end).pose(*self._at(rows, features))
         if end.world_from_base is not None:
@@ -272,7 +289,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -291,7 +308,7 @@ class Calibration:
         q: ArrayLike,
         *,
         tool: ArrayLike | None = None,
-        group: str | None = None,
+        group: str | int | None = None,
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
@@ -302,7 +319,7 @@ class Calibration:
         Raises:
             WorkError: If the target, or its orientation, was not measured in the set-up.
         """
-        return self._std(q, self._oriented(tool, group, target), features, pose=True)
+        return self._std(q, self._endpoint(tool, group, target).oriented(), features, pose=True)
 
     def solve(
         self,
@@ -401,19 +418,7 @@ class Calibration:
             UsageError: If there is no such parameter.
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
-        (rows, single), asked = self._readings(q), words(names, "names")
-        count = AXES * -(-len(asked) // AXES)
-        picked = np.zeros((len(rows), count, self.arm.table.size))
-        for k, name in enumerate(asked):
-            picked[:, k, self.arm.candidates.column(name)] = 1.0
-        if not len(rows):
-            return np.empty((0, len(asked)))
-        together = self.spread.joint(self.field_inputs(rows, features), picked)
-        covariance = np.einsum("ikjk->kij", together.reshape(len(rows), count, len(rows), count))
-        centred = covariance - covariance.mean(axis=1, keepdims=True)
-        variances = np.einsum("kii->ik", centred - centred.mean(axis=2, keepdims=True))
-        found = np.asarray(np.sqrt(np.maximum(variances[:, : len(asked)], 0.0)))
-        return found[0] if single else found
+        return variation_std(self, q, words(names, "names"), features)
 
     def _std(self, q: ArrayLike, end: Endpoint, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
@@ -473,27 +478,18 @@ class Calibration:
         inputs = self.field_inputs(rows, features)
         return np.ascontiguousarray(inputs[:, : self.robot.joint_count]), self.model.parameters(inputs)
 
-    def _endpoint(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
+    def _endpoint(self, tool: ArrayLike | None, group: str | int | None, target: int | None) -> Endpoint:
         if group is None and target is None:
             return Endpoint(at_tool(self.robot, tool))
         return at_target(self, tool, group, target)
-
-    def _oriented(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
-        """The same where its orientation is asked for."""
-        end = self._endpoint(tool, group, target)
-        if end.has_orientation:
-            return end
-        raise WorkError(
-            "the orientation of the target on the tool is not known",
-            rule="It was not measured",
-            way_out="Ask for its position, or give a tool",
-        )
 
     def _chain(self, flange_from_end: Floats) -> Chain:
         return self.arm.chain(self.robot.flange @ flange_from_end)
 
 
-def _restored(content: bytes, seconds: Mapping[str, float], file: bytes | None) -> Calibration:
+def _restored(
+    kind: type[Calibration], content: bytes, seconds: Mapping[str, float], file: bytes | None
+) -> Calibration:
     """A calibration that was pickled: what its file holds, and how long its fits took."""
-    found = Calibration.from_bytes(content, where="a pickled calibration")
+    found = kind.from_bytes(content, where="a pickled calibration")
     return replace(found, seconds=seconds, file=file)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Corrector, Solver
-from truearm.arrays import as_numbers, as_rows, as_transforms
+from truearm.arrays import as_numbers, as_rows, as_transforms, check_finite
 from truearm.calibration import Calibration
 from truearm.errors import InputError, WorkError, count_of
 from truearm.fits.endpoints import at_tool
@@ -29,11 +29,13 @@ from truearm.solving import (
     moving_joints,
     plain_model,
 )
-from truearm.types import Floats
+from truearm.types import Floats, Whole
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 TO_SHOWN: Final = np.array([MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE, MRAD_PER_RAD, MM_PER_METRE])
 TOOLS_KEPT: Final = 16
+NOT_FINITE: Final = 1
+"""Code of a refusal for a reading that is no finite number, see Refusal."""
 
 
 @dataclass(frozen=True)
@@ -96,14 +98,8 @@ class Compensator:
     """Corrects what a program says for the arm that will run it; several threads may share one.
 
     The corrected readings q^c put the tool of the calibrated arm where the programming model puts it for the
-    program's readings q^n: equation (3) of the paper, q^c = q^n - dq, carried to convergence.
-
-    Attributes:
-        calibration: The calibrated model.
-        programming: The model that the program was written with.
-        task: "pose": position and orientation; "axis": position and the tool's z axis; "position". With fewer
-            moving joints than that needs, the position is met first and the rest as near as the arm can.
-        limits: Bounds of the correction.
+    program's readings q^n: equation (3) of the paper, q^c = q^n - dq, carried to convergence. What it was
+    made of cannot be set afterwards: other limits need another compensator.
     """
 
     def __init__(
@@ -112,7 +108,7 @@ class Compensator:
         *,
         programming: Robot | None = None,
         task: Task = "pose",
-        moving: Sequence[int] | None = None,
+        moving: Sequence[int] | Whole | None = None,
         limits: Limits | None = None,
         features: Mapping[str, float] | None = None,
     ) -> None:
@@ -121,7 +117,9 @@ class Compensator:
         Args:
             calibration: What the arm is.
             programming: What the program's author took it for; the calibration's nominal robot by default.
-            task: What is to be met.
+            task: What is to be met: "pose": position and orientation; "axis": position and the tool's z axis;
+                "position". With fewer moving joints than that needs, the position is met first and the rest
+                as near as the arm can.
             moving: Joints that may change, counted from 1; all by default. Where they are more than the task
                 needs, the change is the smallest.
             limits: Bounds; Limits() by default.
@@ -131,18 +129,43 @@ class Compensator:
             UsageError: If the task, a joint or the features are not those of the arm and the calibration.
             InputError: If the programming model is of another arm.
         """
-        self.calibration = required(calibration, Calibration, "the calibration")
-        self.programming = required(programming or calibration.robot, Robot, "the programming model")
-        self.task: Task = task
-        self.limits = required(limits or Limits(), Limits, "the limits")
+        self._calibration = required(calibration, Calibration, "the calibration")
+        self._programming = required(programming or calibration.robot, Robot, "the programming model")
+        self._task: Task = task
+        self._limits = required(limits or Limits(), Limits, "the limits")
         self._check_joints(self.programming)
         self._moving = moving_joints(calibration.robot, moving)
         self._options = core_options(calibration.robot, task, self._moving, self.limits)
         self._features = feature_values(calibration, features)
-        self._programming = plain_model(self.programming)
+        self._plain = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
         self._correctors: OrderedDict[tuple[bytes | str, ...], Corrector] = OrderedDict()
         self._keeping = Lock()
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibrated model."""
+        return self._calibration
+
+    @property
+    def programming(self) -> Robot:
+        """The model that the program was written with."""
+        return self._programming
+
+    @property
+    def task(self) -> Task:
+        """What is met: "pose", "axis" or "position"."""
+        return self._task
+
+    @property
+    def limits(self) -> Limits:
+        """Bounds of the correction."""
+        return self._limits
+
+    @property
+    def moving(self) -> tuple[int, ...] | None:
+        """Joints that may change, counted from 1; None where all may."""
+        return self._moving
 
     @property
     def moving_count(self) -> int:
@@ -198,7 +221,7 @@ class Compensator:
         seeds, flange_from_tool = as_seed(self.programming, seed, len(poses)), self._tool(tool)
         options = core_options(self.programming, self.task, None, self.limits)
         try:
-            solver = Solver(self._programming, flange_from_tool, options)
+            solver = Solver(self._plain, flange_from_tool, options)
             search = Search(self.programming, solver, self.task, flange_from_tool, [])
             rows, refused = search.near(poses, seeds)
         except CoreError as error:
@@ -222,7 +245,10 @@ class Compensator:
         except ValueError as error:
             raise InputError(str(error), where="joint readings") from None
         if refusal is not None:
-            raise WorkError(refusal[1], where="waypoint")
+            code, reason = refusal
+            if code == NOT_FINITE:
+                check_finite(readings[None], what="joint readings")
+            raise WorkError(reason, where="waypoint")
         return corrected
 
     def _tool(self, tool: ArrayLike | None) -> Floats:
@@ -265,7 +291,7 @@ class Compensator:
             if kept is not None:
                 self._correctors.move_to_end(key)
                 return kept
-        programming = self._programming if author is None else plain_model(author)
+        programming = self._plain if author is None else plain_model(author)
         tool = np.ascontiguousarray(flange_from_tool)
         made = Corrector(self._calibrated, programming, tool, self._options)
         with self._keeping:
@@ -304,7 +330,7 @@ def _compensator(
     calibration: Calibration,
     programming: Robot,
     task: Task,
-    moving: Sequence[int] | None,
+    moving: Sequence[int] | Whole | None,
     limits: Limits,
     features: Mapping[str, float],
 ) -> Compensator:

@@ -8,6 +8,7 @@ import numpy as np
 
 from truearm import kinds
 from truearm._core import ANGLE_ARM_M, Setup
+from truearm.arrays import hold_read_only
 from truearm.calibration import Calibration
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts.admitted import admitted
@@ -119,6 +120,9 @@ class Evaluation:
     notices: tuple[Notice, ...] = ()
     rows: HeldRows | None = None
     finds: tuple[str, ...] = ("frame", "tool")
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "errors")
 
     def __repr__(self) -> str:
         divided = f"frame of {self.frame_in_words}, {self.judged_in_words} judged"

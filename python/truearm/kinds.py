@@ -192,6 +192,16 @@ def text(value: object, name: str) -> str:
     return str(value)
 
 
+def name(value: object, argument: str) -> str:
+    """The name that an argument is: a text, or a whole number, as tables give names that are such.
+
+    Raises:
+        UsageError: If it is anything else.
+    """
+    is_number = isinstance(value, Integral) and not isinstance(value, bool)
+    return str(value) if is_number else text(value, argument)
+
+
 def content_bytes(content: object, noun: str) -> bytes:
     """The bytes of a file's content, which may be a bytearray or a memoryview; `noun` is what it is.
 

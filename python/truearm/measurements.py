@@ -19,6 +19,7 @@ from truearm.kinds import count as whole_number
 from truearm.kinds import required, text
 from truearm.tables.columns import StatedUnits
 from truearm.tables.measured_fields import read_fields
+from truearm.tables.own_table import keeping
 from truearm.tables.reading import read_csv_table, table_from_frame
 from truearm.tables.row_fields import CONTENT, LATER, OPTIONAL, PER_ROW, as_field
 from truearm.tables.same_tables import identities, told_apart
@@ -27,6 +28,7 @@ from truearm.types import Floats, Texts
 GROUPS_SHOWN: Final = 3
 
 
+@keeping("features")
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurements:
     """n poses of an N-joint arm and what was measured there. SI units; world is the device's frame.
@@ -41,7 +43,8 @@ class Measurements:
         sigma_m: Standard deviation of a coordinate of the position (n,), NaN where not stated; None where
             never. Where it is stated along axes, their root mean square.
         group: Name of the set-up (n,), hence which world_from_base and which tool.
-        features: All other numeric columns (n, ...), indexed from 0; a copy of the table that was given.
+        features: All other numeric columns (n, ...), indexed from 0: a copy. To change them, give others:
+            `dataclasses.replace(data, features=table)`.
         sources: File of each row (n,).
         rows: Number of each row in its file (n,), the first data row being 1.
         joint_units: Unit of each joint column in the file: "rad", "deg", "m", "mm", or "" where
@@ -112,7 +115,7 @@ class Measurements:
         return f"<Measurements: {size}; {list_names(self.groups[:GROUPS_SHOWN])}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Measurements, tuple(getattr(self, field.name) for field in fields(self))
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     def _check_length(self, name: str, value: Texts | Floats | pd.DataFrame) -> None:
         if len(value) != len(self):

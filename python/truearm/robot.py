@@ -195,7 +195,7 @@ class Robot(RobotData):
         return f"<Robot {self.name}: {self.joint_count} joints, {self.convention} Denavit-Hartenberg>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Robot.from_dict, (self.to_dict(),)
+        return type(self).from_dict, (self.to_dict(),)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Robot) and self.to_dict() == other.to_dict()
@@ -216,7 +216,7 @@ class Robot(RobotData):
     def joints_from_readings(self, q: ArrayLike) -> Floats:
         """Denavit-Hartenberg joint values of readings `q`, (n, N) or (N,)."""
         rows, single = self._readings(q)
-        values = self.values_of(rows)
+        values = np.array(self.values_of(rows))
         return values[0] if single else values
 
     def readings_from_joints(self, q_dh: ArrayLike) -> Floats:
@@ -288,7 +288,7 @@ class Robot(RobotData):
         return as_rows(q, self.joint_count, what=f"joint readings of {self.name}")
 
     def values_of(self, readings: Floats) -> Floats:
-        """Internal: joint values (n, N) of readings (n, N) that were checked."""
+        """Internal: joint values (n, N) of checked readings (n, N): the same array where none is coupled."""
         return np.ascontiguousarray(readings @ self.coupling.T) if self.is_coupled else readings
 
     @cached_property

@@ -17,7 +17,7 @@ from truearm.limits import TASKS, Limits, Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.searching import Search
-from truearm.types import Floats
+from truearm.types import Floats, Whole
 
 if TYPE_CHECKING:
     from truearm._core import CorrectorOptions
@@ -63,7 +63,7 @@ def calibrated_model(calibration: "Calibration") -> ArmModel:
     )
 
 
-def moving_joints(robot: Robot, moving: Sequence[int] | None) -> tuple[int, ...] | None:
+def moving_joints(robot: Robot, moving: Sequence[int] | Whole | None) -> tuple[int, ...] | None:
     """Joints that may change, counted from 1; None where all may.
 
     Raises:

@@ -107,7 +107,7 @@ def _widened(task: Task, fits: Fits) -> float:
     """Root mean square of what a robust loss leaves of rows that are no outliers, in units of its noise."""
     if fits.variable is not None or task.selection.distances or task.options.robust == ROBUST:
         return 1.0
-    rows = FittedRows.of(fits, np.zeros(len(fits.data), dtype=np.int64), task.selection)
+    rows = FittedRows.of(task, fits, np.zeros(len(fits.data), dtype=np.int64))
     kept = rows.residual[rows.score <= 1.0]
     squares = kept**2 / constant_variances(fits, task.selection)[rows.score <= 1.0]
     freedom = max(int(np.count_nonzero(kept)) - fits.identifiability.total_rank, 1)

@@ -58,7 +58,7 @@ def exchanges(task: Task, found: "Calibration", *, doubted: bool) -> Exchanges:
     with task.stages("looking for exchanged rows"):
         fits = unbent(task, rows)
     model = fits.models(task.arm)[CONSTANT]
-    notices = _notices(found, FittedRows.of(fits, rows.side, found.selection), model)
+    notices = _notices(found, FittedRows.of(task, fits, rows.side), model)
     return Exchanges(notices, fits)
 
 

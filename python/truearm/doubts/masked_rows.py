@@ -49,7 +49,7 @@ def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
     if fits.variable is not None or (robust and not task.selection.distances):
         return rows
     apart = fits if robust else unbent(task, rows)
-    judged = FittedRows.of(apart, rows.side, task.selection)
+    judged = FittedRows.of(task, apart, rows.side)
     far = judged.score > 1.0
     if task.selection.distances:
         score = _Judged.of(task, apart).confirmed(judged.score) if far.any() else judged.score
@@ -58,7 +58,12 @@ def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
     if not 0.0 < far.mean() <= MOST_FAR or not bent(fits.constant, found.least_squares(far)):
         return rows
     score = found.confirmed(judged.score)
-    return replace(rows, score=score, distance_m=judged.distance_m) if (score > 1.0).any() else rows
+    outliers = score > 1.0
+    if not outliers.any():
+        return rows
+    by_constants = outliers | (fits.scheme is None)
+    distance = np.where(by_constants, judged.distance_m, rows.distance_m)
+    return replace(rows, score=score, distance_m=distance)
 
 
 def bent_notice(found: "Calibration", apart: Fits) -> list[Notice]:

@@ -177,7 +177,7 @@ def _of_constants(
     """The calibration with constants of other fits to its rows, and the rows as these have them."""
     constant, models = constant_details(task, fits), fits.models(task.arm)
     told = replace(found, models=models, identifiability=fits.identifiability, constant=constant)
-    return told, FittedRows.of(fits, rows.side, task.selection)
+    return told, FittedRows.of(task, fits, rows.side)
 
 
 def _doubted(

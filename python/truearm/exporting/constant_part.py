@@ -4,10 +4,8 @@ from dataclasses import replace
 from typing import Final
 
 from truearm.calibration import Calibration
-from truearm.description.dh_row import row_transform
 from truearm.fits.models import CONSTANT
 from truearm.robot import Robot
-from truearm.types import Floats
 
 HASH_DIGITS: Final = 12
 
@@ -24,14 +22,6 @@ def constant_robot(calibration: Calibration) -> Robot:
         nominal,
         source=f"{source}; nominal: {nominal.source}" if nominal.source else source,
         table=constants[calibration.arm.links],
-        base=_base(calibration, constants),
+        base=calibration.arm.bases(constants[None])[0],
         base_row=None,
     )
-
-
-def _base(calibration: Calibration, constants: Floats) -> Floats:
-    nominal = calibration.robot
-    if not calibration.arm.world_is_known:
-        return nominal.base
-    row = row_transform(constants[0], nominal.convention)
-    return row if nominal.base_row is not None else nominal.base @ row

@@ -158,6 +158,7 @@ def grid_text(
         *([f"Features: {', '.join(stated)}"] if stated else []),
         *notes,
         *_columns_in_words(list(table.columns), calibration),
+        *_base_in_words(calibration),
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
         *_waves_in_words(calibration),
     ]
@@ -209,6 +210,19 @@ def _columns_in_words(columns: Sequence[str], calibration: Calibration) -> list[
             f"{order}. A parameter without a column is the nominal one everywhere"
         )
     return said
+
+
+def _base_in_words(calibration: Calibration) -> list[str]:
+    """Where the base was found, which no column holds: a field leaves it alone."""
+    if not calibration.arm.world_is_known:
+        return []
+    found = calibration.arm.bases(calibration.model.constants[None])
+    shift = _shifts(calibration.robot.base[None], found)[0]
+    moved, turned = (", ".join(f"{value:{SHOWN}}" for value in part) for part in (shift[:3], shift[3:]))
+    return [
+        f"Before link 1 the base is {moved} mm from the nominal one along x, y and z of world, turned by the "
+        f"rotation vector {turned} mrad"
+    ]
 
 
 def _axis(text: str) -> tuple[int, Axis]:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, check_finite, rigid
 from truearm.errors import InputError, UsageError, WorkError, did_you_mean, list_names
-from truearm.kinds import check_number
+from truearm.kinds import check_number, name
 from truearm.robot import Robot
 from truearm.rotations import rigid_motion
 from truearm.types import Floats
@@ -37,6 +37,20 @@ class Endpoint:
     turn_is_fitted: bool = False
     group: int | None = None
     target: int | None = None
+
+    def oriented(self) -> "Endpoint":
+        """This one, of which the orientation is asked for.
+
+        Raises:
+            WorkError: If that is not known.
+        """
+        if self.has_orientation:
+            return self
+        raise WorkError(
+            "the orientation of the target on the tool is not known",
+            rule="It was not measured",
+            way_out="Ask for its position, or give a tool",
+        )
 
     def motions(self, flanges: Floats, *, pose: bool) -> Floats:
         """How the end moves with base and tool as the device saw them, see SetupPlace.motion.
@@ -88,7 +102,7 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
 
 
 def at_target(
-    calibration: "Calibration", tool: ArrayLike | None, group: str | None, target: int | None
+    calibration: "Calibration", tool: ArrayLike | None, group: str | int | None, target: int | None
 ) -> Endpoint:
     """A measured target, or a tool, in the world of a set-up.
 
@@ -102,7 +116,7 @@ def at_target(
         UsageError: If there is no such set-up or target.
         WorkError: If the target was not measured in the set-up.
     """
-    number = _group_number(calibration, group)
+    number = _only_group(calibration) if group is None else group_number(calibration, group)
     setup, selection = calibration.model.setup, calibration.selection
     world_from_base = None if selection.distances else setup.frames[number]
     if tool is not None:
@@ -131,12 +145,24 @@ def at_target(
     return Endpoint(transform, world_from_base, turned, turn_is_fitted=turned, group=number, target=place)
 
 
-def _group_number(calibration: "Calibration", group: str | None) -> int:
-    groups = calibration.groups
-    if group is None and len(groups) == 1:
-        return 0
-    if group not in groups:
-        what = "no group is named" if group is None else f'there is no group "{group}"'
-        near = "" if group is None else did_you_mean(str(group), groups)
-        raise UsageError(what, rule=f"The calibration knows {list_names(groups)}", way_out=near)
-    return groups.index(group)
+def group_number(calibration: "Calibration", group: str | int) -> int:
+    """Number from 0 of the set-up of a name.
+
+    Raises:
+        UsageError: If there is none.
+    """
+    wanted, groups = name(group, "group"), calibration.groups
+    if wanted not in groups:
+        raise UsageError(
+            f'there is no set-up "{wanted}"',
+            rule=f"The calibration knows {list_names(groups)}",
+            way_out=did_you_mean(wanted, groups),
+        )
+    return groups.index(wanted)
+
+
+def _only_group(calibration: "Calibration") -> int:
+    if len(calibration.groups) > 1:
+        knows = f"The calibration knows {list_names(calibration.groups)}"
+        raise UsageError("no group is named", rule=knows)
+    return 0

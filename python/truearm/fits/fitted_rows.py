@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm._core import Problem, residuals
 from truearm.arrays import hold_read_only
 from truearm.errors import Notice, count_of
-from truearm.fits.core_set import Selection, distance_ends
-from truearm.fits.fitting import Fits, constant_variances
+from truearm.fits.core_set import Selection, core_set, distance_ends
+from truearm.fits.fitting import Fits, Task, constant_variances
+from truearm.fits.models import ArmModel
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split
 from truearm.types import Floats
@@ -41,11 +43,13 @@ class FittedRows:
             orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
             pair once.
         score: Squared standardised residuals over their limit (n,); above one is an outlier. Of variable
-            models they are what the model leaves of a row that it was not fitted to (leave-one-out).
+            models they are what the model leaves of a row that it was not fitted to (leave-one-out), of the
+            paper's schemes what their constants leave: a scheme follows rows that it was fitted to.
         distance_m: How far the farthest target of each row is from where the model has it (n,). Of variable
             models it is how far its first target is from where the model without the row has it, if that is
             more: of rows of full weight it mostly is, of outliers, which the model hardly follows, both are
-            the same. A distance is off by so much in its row, in both of a pair. Distances of a calibration,
+            the same. A distance is off by so much in its row, in both of a pair. That of a scheme's
+            outliers is from where its constants have them. Distances of a calibration,
             and points that bend its constants, are judged by constants that rows far off do not bend, as are
             their scores.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
@@ -72,8 +76,9 @@ class FittedRows:
         return f"<FittedRows: {count_of(len(self.side), 'row')}, {count_of(len(self.outliers()), 'outlier')}>"
 
     @classmethod
-    def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":
+    def of(cls, task: Task, fits: Fits, side: NDArray[np.int64]) -> "FittedRows":
         """Internal: the rows of a fit; `side` (n,) in their order."""
+        selection = task.selection
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
@@ -82,6 +87,9 @@ class FittedRows:
                 distance = at_rows(np.abs(residual[:, 0]), fits.data)
             else:
                 distance = farthest_m(residual, selection)
+            if fits.scheme is not None:
+                residual = _residuals(task, fits.models(task.arm)[fits.scheme_name], fits.data)
+                distance = np.where(score > 1.0, distance, farthest_m(residual, selection))
             found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
         else:
             variable = fits.variable
@@ -123,6 +131,15 @@ class FittedRows:
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
+
+
+def _residuals(task: Task, model: ArmModel, data: Measurements) -> Floats:
+    """Measured minus predicted (n, m) of a model that varies with the joints alone, base frame."""
+    arm = task.arm
+    measured = core_set(arm.robot, data, task.selection, task.groups)
+    problem = Problem(arm.flange_chain, measured, [], arm.world_is_known)
+    parameters = model.parameters(arm.robot.joints_from_readings(data.readings))
+    return residuals(problem, np.ascontiguousarray(parameters), model.setup)
 
 
 def without_drift(data: Measurements, moved: Floats | None) -> Measurements:

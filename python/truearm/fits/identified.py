@@ -75,9 +75,21 @@ class IdentifiedArm:
 
     def chain(self, end: Floats) -> Chain:
         """The compiled chain that ends with the transform `end` (4, 4) after the last link."""
+        return self._chain(self.joints, np.ascontiguousarray(end))
+
+    def bases(self, parameters: Floats) -> Floats:
+        """Transforms (n, 4, 4) before the first link, of parameters (n, L, 5)."""
+        if not self.world_is_known:
+            return np.tile(self.robot.base, (len(parameters), 1, 1))
+        row = np.ascontiguousarray(parameters[:, :1])
+        # A chain needs a joint: the base is one that stands at zero.
+        return self._chain(["revolute"], np.eye(4)).pose(np.zeros((len(row), 1)), row)
+
+    def _chain(self, joints: list[str], end: Floats) -> Chain:
+        """The compiled chain of the first rows, as many as joints."""
         base_is_row = self.world_is_known and self.robot.base_row is not None
         base = np.eye(4) if base_is_row else self.robot.base
-        return Chain(self.robot.convention, self.joints, self.table, base, np.ascontiguousarray(end))
+        return Chain(self.robot.convention, joints, self.table[: len(joints)], base, end)
 
     @cached_property
     def candidates(self) -> Candidates:

@@ -41,7 +41,7 @@ class HeldRows:
     errors: Mapping[str, RowErrors]
 
     def __post_init__(self) -> None:
-        hold_read_only(self, "readings", "rows", "sources")
+        hold_read_only(self, "readings", "rows", "sources", "errors")
 
     def __repr__(self) -> str:
         return f"<HeldRows: {count_of(len(self), 'row')}, errors of {list_names(self.errors)}>"

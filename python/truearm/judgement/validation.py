@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
+from truearm.arrays import hold_read_only
 from truearm.errors import InputError, count_of
 from truearm.fits.core_set import Selection, core_set, first_measured
 from truearm.fits.details import DriftDetails
@@ -104,6 +105,9 @@ class RowErrors:
     position: Floats
     orientation: Floats | None = None
 
+    def __post_init__(self) -> None:
+        hold_read_only(self, "position", "orientation")
+
     @property
     def distance_m(self) -> Floats:
         """Lengths of the position errors (n,)."""
@@ -178,6 +182,9 @@ class Validation:
     left_out: bool = False
     n_planned: int = 0
     drift: DriftDetails | None = None
+
+    def __post_init__(self) -> None:
+        hold_read_only(self, "holdout", "train")
 
     def __repr__(self) -> str:
         trained = f"{self.poses_trained}, " if self.n_train else ""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from truearm.arrays import as_numbers, as_rows
 from truearm.description.joint_axes import axes_at_zero
-from truearm.errors import InputError, UsageError
+from truearm.errors import InputError, UsageError, count_of
 from truearm.fits.endpoints import at_tool
 from truearm.kinds import check_number, check_values
 from truearm.planning.configurations import link_frames
@@ -94,23 +94,34 @@ def accessible(
         tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
 
     Raises:
-        InputError: If readings or tool are not finite numbers of these shapes, or a rule answers with another
-            shape than (n,).
+        InputError: If readings or tool are not finite numbers of these shapes, or a rule answers with
+            anything but booleans (n,).
     """
     poses, _ = as_rows(readings, robot.joint_count, what=f"joint readings of {robot.name}")
     flange_from_tool = at_tool(robot, tool)
     allowed = np.ones(len(poses), dtype=np.bool_)
     for rule in rules:
         rows = np.flatnonzero(allowed)
-        answer = np.asarray(rule(Places(robot, poses[rows], flange_from_tool)))
-        if answer.shape != rows.shape:
-            raise InputError(
-                f"a rule of accessibility answered with shape {answer.shape}",
-                where=name_of(rule),
-                rule=f"It must say true or false of each of {len(rows)} poses",
-            )
-        allowed[rows] = answer.astype(np.bool_)
+        allowed[rows] = answer_of(rule, Places(robot, poses[rows], flange_from_tool))
     return allowed
+
+
+def answer_of(rule: Rule, places: Places) -> Mask:
+    """What a rule says of n places, (n,).
+
+    Raises:
+        InputError: If it says anything but true or false of each: taken for such, a distance, NaN or ~1 would
+            allow what they are to forbid.
+    """
+    answer, count = np.asarray(rule(places)), len(places.readings)
+    if answer.shape == (count,) and (answer.dtype == np.bool_ or count == 0):
+        return answer.astype(np.bool_)
+    raise InputError(
+        f"a rule of accessibility answered with {answer.dtype} of shape {answer.shape}",
+        where=name_of(rule),
+        rule=f"It must say true or false of each of {count_of(count, 'pose')}, as booleans ({count},)",
+        way_out="Answer with a comparison, such as places.point[:, 2] > 0.1",
+    )
 
 
 def name_of(rule: Rule) -> str:
@@ -141,7 +152,7 @@ class InBox:
     high: ArrayLike
 
     def __post_init__(self) -> None:
-        _check_box(self.low, self.high)
+        _hold_box(self)
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -157,6 +168,11 @@ class InSphere:
     centre: ArrayLike
     radius_m: float
     least_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        _hold_place(self, "centre")
+        check_number(self.radius_m, "radius_m")
+        check_number(self.least_m, "least_m")
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -181,7 +197,8 @@ class InCone:
     target_half_angle_rad: float = np.pi
 
     def __post_init__(self) -> None:
-        _check_direction(self.axis, "axis")
+        _hold_place(self, "apex")
+        _hold_direction(self, "axis")
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -206,8 +223,8 @@ class LeastContactAngle:
     least_deg: float = LEAST_CONTACT_DEG
 
     def __post_init__(self) -> None:
-        _check_direction(self.normal, "normal")
-        _check_direction(self.pin, "pin")
+        _hold_direction(self, "normal")
+        _hold_direction(self, "pin")
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
@@ -233,7 +250,7 @@ class KeepOut:
     holds_on_ways: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_box(self.low, self.high)
+        _hold_box(self)
         check_number(self.margin_m, "margin_m")
         check_values(self, not_negative=("margin_m",))
 
@@ -293,28 +310,48 @@ def either(*rules: Rule) -> Rule:
     """A rule that allows what any of `rules` allows, such as the sight of one device or another."""
 
     def any_of(places: Places) -> Mask:
-        return np.asarray(np.logical_or.reduce([rule(places) for rule in rules]))
+        return np.asarray(np.logical_or.reduce([answer_of(rule, places) for rule in rules]))
 
     return any_of
 
 
-def _check_box(low: ArrayLike, high: ArrayLike) -> None:
-    """Raise UsageError unless these are the corners (3,) of a box."""
-    least, most = (as_numbers(side, what="the sides of a box") for side in (low, high))
+def _hold_box(rule: InBox | KeepOut) -> None:
+    """Make low and high the rule's own; raise UsageError unless they are the corners (3,) of a box."""
+    least, most = (as_numbers(side, what="the sides of a box") for side in (rule.low, rule.high))
     if least.shape != (3,) or most.shape != (3,) or not (least <= most).all():
         raise UsageError(
             f"a box from {least.tolist()} to {most.tolist()}",
             rule="x, y and z in m, the lowest and then the highest",
         )
+    _hold(rule, "low", least)
+    _hold(rule, "high", most)
 
 
-def _check_direction(given: ArrayLike, name: str) -> None:
-    """Raise UsageError unless this is a vector (3,) that leads somewhere."""
-    vector = as_numbers(given, what=f"the numbers of {name}")
+def _hold_place(rule: Rule, name: str) -> None:
+    """Make a place the rule's own numbers; raise UsageError unless it is one (3,)."""
+    place = as_numbers(getattr(rule, name), what=f"the numbers of {name}")
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise UsageError(
+            f"{name} is {place.tolist()}", rule="A place has three finite numbers, x, y and z in m"
+        )
+    _hold(rule, name, place)
+
+
+def _hold_direction(rule: Rule, name: str) -> None:
+    """Make a direction the rule's own numbers; raise UsageError unless it is a vector (3,) that leads
+    somewhere.
+    """
+    vector = as_numbers(getattr(rule, name), what=f"the numbers of {name}")
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise UsageError(
             f"{name} is {vector.tolist()}", rule="A direction has three finite numbers, not all of them zero"
         )
+    _hold(rule, name, vector)
+
+
+def _hold(rule: Rule, name: str, numbers: Floats) -> None:
+    """Give a rule numbers that do not change with the array that was given."""
+    object.__setattr__(rule, name, tuple(numbers.tolist()))
 
 
 def _angle(vectors: Floats, others: Floats) -> Floats:

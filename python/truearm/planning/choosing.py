@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm import kinds
 from truearm._core import CoreError, Problem, choose_poses, independent_columns, linearise, setup_jacobian
+from truearm.arrays import as_rows
 from truearm.errors import UsageError, WorkError, list_names
 from truearm.fits.core_set import known_setup, measured_points
 from truearm.fits.endpoints import at_tool
@@ -82,11 +83,11 @@ class Choice:
 
 def choose(
     arm: IdentifiedArm,
-    readings: Floats,
+    readings: ArrayLike,
     count: int,
     options: ChoiceOptions | None = None,
     *,
-    given: Floats | None = None,
+    given: ArrayLike | None = None,
 ) -> Choice:
     """Choose `count` of the poses `readings` (n, N).
 
@@ -104,20 +105,24 @@ def choose(
 
     Raises:
         UsageError: If there is no such parameter, or `count` is no whole number.
+        InputError: If poses are not finite numbers of these shapes.
         WorkError: If the pool is smaller than the choice, the choice too small to determine the unknowns, or
             a parameter that is named is not determined.
     """
     kinds.required(arm, IdentifiedArm, "the arm")
     kinds.check_number(count, "count", Integral)
     chosen = kinds.chosen(ChoiceOptions, options, {})
-    if len(readings) < count:
+    pool = _poses(arm, readings)
+    if len(pool) < count:
         raise WorkError(
-            f"{count} poses are to be chosen from {len(readings)}",
+            f"{count} poses are to be chosen from {len(pool)}",
             rule="The pool must be larger than the choice",
             way_out="Draw a larger pool, or choose fewer",
         )
-    jacobian, columns = unknowns_jacobian(arm, readings, chosen)
-    before = jacobian[:0] if given is None or not len(given) else unknowns_jacobian(arm, given, chosen)[0]
+    jacobian, columns = unknowns_jacobian(arm, pool, chosen)
+    before = jacobian[:0]
+    if given is not None and np.size(given):
+        before = unknowns_jacobian(arm, _poses(arm, given), chosen)[0]
     kept = independent_columns(np.concatenate([before, jacobian]), columns)
     if chosen.names is not None:
         _check_determined(arm, columns, kept, setup=len(setup_kinds(arm, pose=chosen.pose)))
@@ -131,7 +136,7 @@ def choose(
         "passes": chosen.passes,
     }
     wanted, rng = np.ascontiguousarray(jacobian[:, :, kept]), np.random.default_rng(0)
-    drawn = [rng.permutation(len(readings))[:count].astype(np.int64) for _ in range(chosen.starts - 1)]
+    drawn = [rng.permutation(len(pool))[:count].astype(np.int64) for _ in range(chosen.starts - 1)]
     try:
         ends = [choose_poses(wanted, count, {**how, "start": start}) for start in (None, *drawn)]
     except CoreError as error:
@@ -139,6 +144,11 @@ def choose(
     best = max(ends, key=lambda end: _merit(end.after, chosen.criterion))
     rows = np.array(best.chosen, dtype=np.int64)
     return Choice(rows, ends[0].before, best.after, best.exchanges, best.well_conditioned)
+
+
+def _poses(arm: IdentifiedArm, readings: ArrayLike) -> Floats:
+    rows, _ = as_rows(readings, arm.robot.joint_count, what=f"joint readings of {arm.robot.name}")
+    return rows
 
 
 def _merit(indices: Mapping[str, float], criterion: Criterion) -> float:

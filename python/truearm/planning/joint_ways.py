@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.planning.accessibility import Places, Rule, lowest
+from truearm.planning.accessibility import Places, Rule, answer_of, lowest
 from truearm.robot import Robot
 from truearm.types import Floats, Mask
 
@@ -76,7 +76,7 @@ class JointWays:
         for tool in self.tools:
             places = Places(self.robot, readings, tool)
             for rule in self.rules_on_ways:
-                kept &= rule(places)
+                kept &= answer_of(rule, places)
         return kept
 
     def lowest_m(self, stops: Floats) -> float:

@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.arrays import as_numbers
+from truearm.arrays import as_numbers, read_only
 from truearm.errors import UsageError
 from truearm.fits.scheme_options import MAJOR_JOINTS
 from truearm.kinds import required, whole_numbers
@@ -75,7 +75,7 @@ class JointSpace:
         limits = self.robot.limits[self._columns]
         for name, limit in (("low", limits[:, 0]), ("high", limits[:, 1])):
             given = np.asarray(getattr(self, name), dtype=np.float64)
-            object.__setattr__(self, name, limit if given.size == 0 else given)
+            object.__setattr__(self, name, read_only(limit if given.size == 0 else given))
         _check_box(self)
         self._check_limits(limits)
 
@@ -143,8 +143,8 @@ class CartesianSpace:
         _check_joints(self)
         if len(self.joints) != len(self.names):
             raise UsageError(f"joints {list(self.joints)}", rule="Three joints reach a position")
-        for name in ("low", "high"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+        for name in ("low", "high", "origin"):
+            object.__setattr__(self, name, read_only(np.asarray(getattr(self, name), dtype=np.float64)))
         _check_box(self)
 
     @property
@@ -227,7 +227,7 @@ def _check_joints(space: JointSpace | CartesianSpace) -> None:
         raise UsageError(
             f"{held.tolist()}", where="held", rule=f"A finite reading of each of the {count} joints"
         )
-    object.__setattr__(space, "held", held)
+    object.__setattr__(space, "held", read_only(held))
 
 
 def _check_box(space: Space) -> None:

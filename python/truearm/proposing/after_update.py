@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from truearm.calibration import Calibration
 from truearm.errors import TooFewError
@@ -21,7 +22,7 @@ PREDICTED: Final = "as predicted"
 
 def expected_by_update(
     candidates: Candidates,
-    workspace: Floats,
+    workspace: ArrayLike,
     before: Calibration,
     rows: Sequence[Measurements] = (),
     options: UpdateOptions | None = None,

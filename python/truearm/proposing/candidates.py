@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truearm._core import Problem, Setup, linearise, setup_jacobian
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, read_only
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import task_of
 from truearm.errors import UsageError, WorkError, count_of, did_you_mean, list_names
 from truearm.fits.core_set import Selection, measured_points
+from truearm.fits.endpoints import group_number
 from truearm.fits.enough_values import setup_unknowns
 from truearm.kinds import required
 from truearm.types import AXES, Floats, Mask
@@ -36,16 +37,16 @@ class Candidates:
 
     calibration: Calibration
     readings: Floats
-    group: str | None = None
+    group: str | int | None = None
     features: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        known = required(self.calibration, Calibration, "the calibration").groups
-        robot = self.calibration.robot
+        robot = required(self.calibration, Calibration, "the calibration").robot
         rows, _ = as_rows(self.readings, robot.joint_count, what=f"joint readings of {robot.name}")
-        object.__setattr__(self, "readings", rows)
-        if self.group is not None and self.group not in known:
-            raise UsageError(f'there is no set-up "{self.group}"', rule=f"There are {list_names(known)}")
+        object.__setattr__(self, "readings", read_only(rows))
+        if self.group is not None:
+            number = group_number(self.calibration, self.group)
+            object.__setattr__(self, "group", self.calibration.groups[number])
         names = self.calibration.options.features
         for name in self.features or {}:
             if name not in names:
@@ -137,8 +138,9 @@ class Candidates:
 
     @property
     def _number(self) -> int:
-        groups = self.calibration.groups
-        return len(groups) - 1 if self.group is None else groups.index(self.group)
+        if self.group is None:
+            return len(self.calibration.groups) - 1
+        return group_number(self.calibration, self.group)
 
     @cached_property
     def feature_values(self) -> Mapping[str, float]:

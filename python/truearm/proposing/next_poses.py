@@ -3,9 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import choose_informative
+from truearm.arrays import as_rows
 from truearm.errors import UsageError, WorkError
 from truearm.kinds import required
 from truearm.proposing.candidates import Candidates
@@ -33,7 +34,7 @@ class NextPoses:
         return len(self.expected_mm) == 1 or bool(self.expected_mm[-1] < self.expected_mm[0])
 
 
-def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPoses:
+def next_poses(candidates: Candidates, workspace: ArrayLike, count: int) -> NextPoses:
     """Choose `count` candidates one after the other, each that which leaves the workspace the least variance.
 
     The variance is the exact Gaussian posterior's, of constants, field and set-up together, after the
@@ -53,17 +54,19 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
     check_count(candidates, count)
     where = workspace_of(candidates, workspace)
     rows, variance = choose_informative(candidates.covariance(where), candidates.core(), count)
-    expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
+    expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(where))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
 
 
-def workspace_of(candidates: Candidates, readings: Floats) -> Candidates:
+def workspace_of(candidates: Candidates, readings: ArrayLike) -> Candidates:
     """The readings (t, N) at which the error counts, in the set-up of the candidates.
 
     Raises:
         UsageError: If there are none.
     """
-    where = replace(candidates, readings=readings, group=candidates.set_up)
+    robot = candidates.calibration.robot
+    rows, _ = as_rows(readings, robot.joint_count, what=f"joint readings of {robot.name}")
+    where = replace(candidates, readings=rows, group=candidates.set_up)
     if len(where) == 0:
         raise UsageError("the workspace has no poses", rule="The error is told at one or more")
     return where

@@ -80,7 +80,7 @@ def readings_at(facts: Facts, base: Floats, values: Mapping[JointAxis, Floats]) 
             readings[:, along.joint] = wanted
     if not any(along.of_value for along in values):
         return readings
-    held = np.array(robot.joints_from_readings(readings))
+    held = robot.joints_from_readings(readings)
     for along, wanted in values.items():
         if along.of_value:
             held[:, along.joint] = wanted

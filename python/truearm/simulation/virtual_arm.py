@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from truearm._core import Chain
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, read_only
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed
 from truearm.kinds import count, required, whole_numbers
@@ -59,8 +59,6 @@ class VirtualArm:
         robot: The arm as it is meant to be.
         imperfections: Sizes of its errors.
         names: Names of the rows' erring parameters: kind and row, where row 0 is the base.
-        errors: True minus nominal parameters (rows, 5) in m and rad, theta, d, a, alpha, beta in a row;
-            the rows are the base, if the robot file gives it as one, and the links.
         world_from_base: Pose (4, 4) of the base in the frame of the instrument.
         target_in_flange: The measured point (3,) in the flange frame, m.
     """
@@ -93,7 +91,7 @@ class VirtualArm:
         check_joints(robot, self.imperfections.joint_errors, self.imperfections.deflection)
         rng = np.random.default_rng([seed, 0])
         self.names = tuple(default_parameters(robot) if parameters is None else parameters)
-        self.errors = draw_errors(robot, self.names, self.imperfections, rng)
+        self._errors = read_only(draw_errors(robot, self.names, self.imperfections, rng))
         self.world_from_base = random_transform(rng, TRACKER_DISTANCE_M)
         offset = TARGET_OFFSET_M * direction(rng)
         self.target_in_flange: Floats = robot.tool[:3, 3] + offset
@@ -104,6 +102,13 @@ class VirtualArm:
         outputs = 3 if self.imperfections.non_geometric == "cartesian" else len(self._waving)
         self._harmonics = rng.normal(scale=DRAWN_HARMONIC, size=(2 * len(self._waving), outputs))
         self._harmonics *= self._scale_to_share()
+
+    @property
+    def errors(self) -> Floats:
+        """True minus nominal parameters (rows, 5) in m and rad, theta, d, a, alpha, beta in a row; the rows
+        are the base, if the robot file gives it as one, and the links. They are as drawn, and read-only.
+        """
+        return self._errors
 
     def __repr__(self) -> str:
         return f"<VirtualArm of {self.robot.name}: seed {self.seed}, {len(self.names)} erring parameters>"
@@ -272,7 +277,7 @@ class VirtualArm:
         """Denavit-Hartenberg joint values (n, N) with the errors of joints and what gives way."""
         imperfections = self.imperfections
         erring = readings + joint_errors(imperfections.joint_errors, readings, met.approach)
-        values = np.array(self.robot.joints_from_readings(erring))
+        values = self.robot.joints_from_readings(erring)
         if imperfections.deflection is None:
             if np.any(np.asarray(met.payload_kg) != 0.0):
                 raise InputError(

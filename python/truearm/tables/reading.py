@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
 from truearm.files import LOOKED_AT, ZIP, decode_text, name_in_text, read_bytes, utf_16_of
-from truearm.types import Floats, Integers, Texts
+from truearm.types import Floats, Integers, Mask, Texts, Whole
 from truearm.units import HEADER_UNITS, bare_unit
 
-Cells = NDArray[np.object_] | Floats
-"""Texts as objects, as in an array of texts each takes what the longest takes; or numbers."""
+Cells = NDArray[np.object_] | Floats | Whole | Mask
+"""Texts as objects, as in an array of texts each takes what the longest takes; or numbers, or booleans."""
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 WHOLE: Final = re.compile(r"\d+(\.0+)?")
@@ -98,6 +98,8 @@ class Table:
         column = self.columns[name]
         if column.dtype.kind == "f":
             return [_in_words(value) for value in column.tolist()]
+        if column.dtype != np.object_:
+            return list(map(str, column.tolist()))
         return [cell.strip() for cell in column.tolist()]
 
     def names_in(self, name: str) -> Texts:
@@ -115,8 +117,9 @@ class Table:
             InputError: If a cell holds text, NaN or an infinite value; names the rows.
         """
         column = self.columns[name]
-        if column.dtype.kind == "f":
-            return self._checked(name, column.astype(np.float64), np.isinf(column.astype(np.float64)))
+        if column.dtype != np.object_:
+            numbers = column.astype(np.float64)
+            return self._checked(name, numbers, np.isinf(numbers))
         if name not in self._numbers:
             self._numbers[name] = self._parsed(name)
         return self._numbers[name]
@@ -188,11 +191,7 @@ def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers |
     """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
     columns: dict[str, Cells] = {}
     for name in frame.columns:
-        column = frame[name]
-        if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
-            columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
-        else:
-            columns[str(name)] = column.astype(str).where(column.notna(), "").to_numpy(dtype=np.object_)
+        columns[str(name)] = _cells_of(frame[name])
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
     return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
@@ -409,6 +408,19 @@ def _all_names(names: Mapping[int, str]) -> str:
     each = [names.get(position) or "-" for position in range(1, max(names) + 1)]
     end = ["-"] if not names[max(names)] else []
     return ",".join(each if len(each) <= SHOWN_NAMES + 1 else [*each[:SHOWN_NAMES], "...", *end])
+
+
+def _cells_of(column: pd.Series) -> Cells:
+    """The cells of a column: whole numbers and booleans as such, which may be names of many digits."""
+    types = pd.api.types
+    is_whole = types.is_integer_dtype(column)
+    if is_whole and not column.hasnans:
+        return column.to_numpy(dtype=np.uint64 if types.is_unsigned_integer_dtype(column) else np.int64)
+    if types.is_bool_dtype(column) and not column.hasnans:
+        return column.to_numpy(dtype=np.bool_)
+    if not is_whole and types.is_numeric_dtype(column) and not types.is_complex_dtype(column):
+        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+    return column.astype(str).where(column.notna(), "").to_numpy(dtype=np.object_)
 
 
 def _in_words(number: float) -> str:

@@ -1,0 +1,163 @@
+"""What was given, or made, is not changed behind anyone's back, nor set to no effect."""
+
+import copy
+import pickle
+from dataclasses import FrozenInstanceError, replace
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import truearm as ta
+from truearm.planning import InBox, JointSpace, KeepOut
+from truearm.proposing import Candidates
+from truearm.simulation import VirtualArm
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return ta.Robot.load("ur10")
+
+
+@pytest.fixture(scope="module")
+def data(robot):
+    arm = VirtualArm(robot, seed=2)
+    return arm.measure(arm.poses(60))
+
+
+@pytest.fixture(scope="module")
+def calibration(robot, data):
+    return ta.calibrate(robot, data, model="constant")
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [
+        ("calibration", None),
+        ("programming", None),
+        ("task", "position"),
+        ("moving", (1, 2, 3)),
+        ("limits", ta.Limits(largest_mm=0.01)),
+        ("features", (22.0,)),
+    ],
+)
+def test_what_a_compensator_was_made_of_cannot_be_set(name, other, calibration):
+    compensator = ta.Compensator(calibration)
+    with pytest.raises(AttributeError, match=name):
+        setattr(compensator, name, other)
+
+
+@pytest.mark.parametrize("name", ["ur10", "rv-m2"])
+def test_joint_values_are_no_ones_readings(name):
+    robot = ta.Robot.load(name)
+    q = np.full((3, robot.joint_count), 0.2)
+    for given in (q, q[0]):
+        for convert in (robot.joints_from_readings, robot.readings_from_joints):
+            convert(given)[:] += 1.0
+    np.testing.assert_array_equal(q, 0.2)
+
+
+def test_candidates_spaces_and_rules_keep_their_numbers(robot, calibration):
+    q = np.full((2, 6), 0.2)
+    candidates = Candidates(calibration, q)
+    held, low, high = q[0], np.zeros(3), np.ones(3)
+    space, box, kept = JointSpace(robot, low, high, held=held), InBox(low, high), KeepOut(low, high)
+    for array in (q, low, high):
+        array[:] = 5.0
+    np.testing.assert_array_equal(candidates.readings, 0.2)
+    assert not candidates.readings.flags.writeable
+    np.testing.assert_array_equal(space.readings(np.zeros((1, 3)))[0][0, 3:], 0.2)
+    np.testing.assert_array_equal([space.low, box.low, kept.low], 0.0)
+    np.testing.assert_array_equal([space.high, box.high, kept.high], 1.0)
+
+
+def views_of(numbers):
+    """A read-only view of an array that is its owner's to change, and the array."""
+    owned = np.array(numbers)
+    view = owned[:]
+    view.flags.writeable = False
+    return view, owned
+
+
+def test_measurements_do_not_change_with_the_data_they_were_made_of(data):
+    readings, own_readings = views_of(data.readings)
+    sigma, own_sigma = views_of(np.full(len(data), 1e-4))
+    table = pd.DataFrame({"temperature_C": np.full(len(data), 20.0)})
+    made = replace(data, readings=readings, sigma_m=sigma, features=table)
+    before = made.hash()
+    own_readings[0], own_sigma[3] = 9.0, 5.0
+    table.loc[0, "temperature_C"] = 40.0
+    np.testing.assert_array_equal(made.readings, data.readings)
+    assert made.hash() == before
+
+
+def test_columns_of_a_table_become_measurements_own(data):
+    table = pd.DataFrame({"s": np.full(len(data), 1e-4)})
+    made = replace(data, sigma_m=table["s"].to_numpy())
+    table.loc[3, "s"] = 5.0
+    np.testing.assert_array_equal(made.sigma_m, 1e-4)
+
+
+def test_features_are_handed_out_as_copies(data):
+    made = replace(data, features=pd.DataFrame({"temperature_C": np.full(len(data), 20.0)}))
+    before = made.hash()
+    table = made.features
+    table["temperature_C"] += 273.15
+    made.features["temperature_C"].to_numpy(copy=True)[0] = 0.0
+    assert made.hash() == before
+    warmer = replace(made, features=table)
+    np.testing.assert_array_equal(warmer.features["temperature_C"], 293.15)
+    with pytest.raises(FrozenInstanceError):
+        made.features = table
+    assert pickle.loads(pickle.dumps(made)).hash() == copy.deepcopy(made).hash() == before
+
+
+def test_own_rows_are_kept_without_copies(data):
+    assert np.shares_memory(replace(data, readings=data.readings[:]).readings, data.readings)
+
+
+def test_what_a_calibration_says_by_name_cannot_be_set(calibration, data):
+    evaluation = ta.evaluate(calibration, data)
+    told: list[Any] = [calibration.models, calibration.validation.holdout, evaluation.errors]
+    for said in told:
+        with pytest.raises(TypeError, match="read-only"):
+            said["constant"] = said["nominal"]
+        with pytest.raises(TypeError, match="read-only"):
+            said.pop("constant")
+    with pytest.raises(ValueError, match="read-only"):
+        calibration.held.errors["constant"].position[:] = 0.0
+    for again in (copy.deepcopy, lambda said: pickle.loads(pickle.dumps(said))):
+        found = again(calibration.validation)
+        assert found == calibration.validation
+        with pytest.raises(TypeError, match="read-only"):
+            found.holdout.clear()
+
+
+def test_the_errors_of_a_virtual_arm_are_as_drawn(robot):
+    arm = VirtualArm(robot, seed=1)
+    with pytest.raises(ValueError, match="read-only"):
+        arm.errors[2, 2] += 0.01
+    with pytest.raises(AttributeError, match="errors"):
+        cast("Any", arm).errors = np.zeros((6, 5))
+
+
+class OwnRobot(ta.Robot):
+    """A user's own kind of robot."""
+
+
+class OwnMeasurements(ta.Measurements):
+    """A user's own kind of measurements."""
+
+
+class OwnCalibration(ta.Calibration):
+    """A user's own kind of calibration."""
+
+
+def test_own_kinds_are_sent_and_copied_as_what_they_are(data, calibration, tmp_path):
+    calibration.save(tmp_path / "arm.calib")
+    own = OwnCalibration.load(tmp_path / "arm.calib")
+    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own):
+        for again in (copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))):
+            assert type(again(thing)) is type(thing)
+    assert copy.deepcopy(own).to_bytes() == calibration.to_bytes()
