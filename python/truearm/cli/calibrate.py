@@ -287,6 +287,7 @@ def _judged_in_words(calibration: "Calibration") -> str:
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
+    from truearm.doubts.moved_words import TAKEN_FOR_NOISE
     from truearm.fits.models import CONSTANT, leaves_noise
     from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
     from truearm.storage.summary import states_sigma
@@ -301,11 +302,12 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     it = "With that sigma it" if beyond else "It"
     kept = bool(summary["outliers"]) and fate_of_outliers(calibration) == FULL_WEIGHT
     noise = "noise, the outliers" if kept else "noise"
-    alone = (
-        f"Mean error that noise alone would leave: {left}."
-        if leaves_noise(name)
-        else f"{it} makes a mean error of {left}: {noise} and, {also}, what varies with the joints."
-    )
+    if not leaves_noise(name):
+        alone = f"{it} makes a mean error of {left}: {noise} and, {also}, what varies with the joints."
+    elif any(notice.kind in TAKEN_FOR_NOISE for notice in calibration.notices):
+        alone = f"{it} makes a mean error of {left}: {noise}, and what is taken for it, as a warning says."
+    else:
+        alone = f"Mean error that noise alone would leave: {left}."
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
         f"{per}. {alone}"

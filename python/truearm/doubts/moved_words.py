@@ -15,6 +15,8 @@ UNUSED_COLUMN: Final = "unused_column"
 JOINTS_MOVED: Final = "joints_moved"
 LINKS_GREW: Final = "links_grew"
 SETUP_TURNING: Final = "setup_turning"
+TAKEN_FOR_NOISE: Final = (UNUSED_COLUMN, JOINTS_MOVED, LINKS_GREW, SETUP_TURNING)
+"""Kinds of notices of what a model takes for noise, so that what it leaves is more than noise."""
 JOINTS: Final = "joints"
 LINKS: Final = "links"
 LOAD: Final = "load"

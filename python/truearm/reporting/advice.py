@@ -176,7 +176,9 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if not leaves_noise(facts.best) or facts.changed_meanwhile or any(_stated_sigma(facts)):
+    if not leaves_noise(facts.best) or facts.leaves_more_than_noise:
+        return
+    if facts.changed_meanwhile or any(_stated_sigma(facts)):
         return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)

@@ -13,6 +13,7 @@ from truearm.description.one_turn import one_turn
 from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.few_judged import UNDECIDED, FewJudged
 from truearm.doubts.grids import grid_steps, grid_words
+from truearm.doubts.moved_words import TAKEN_FOR_NOISE
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
 from truearm.evaluation import Evaluation
@@ -248,6 +249,11 @@ class Facts:
     def changed_meanwhile(self) -> bool:
         """Whether something stood otherwise from some measured row on."""
         return any(map(self.noticed, STEP_KINDS))
+
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the model took for noise what moved with a column, or meanwhile."""
+        return any(map(self.noticed, TAKEN_FOR_NOISE))
 
     @cached_property
     def still(self) -> str:

@@ -155,7 +155,12 @@ def cards(facts: Facts) -> list[Card]:
     if leaves_noise(facts.best) and tells_noise:
         floor = facts.floor_mm
         together = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
-        found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{together}"))
+        of = (
+            "of what the model does not explain"
+            if facts.leaves_more_than_noise
+            else "that noise alone would leave"
+        )
+        found.append(Card(*_short_mm(floor), f"mean error {of}{together}"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
         found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
