@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.doubts.at_once import SETUP_TURNED, STEP_KINDS
+from truearm.doubts.few_judged import few_in_words, is_of_a_range
 from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_words import JOINTS_MOVED, LINKS_GREW, SETUP_TURNING, UNUSED_COLUMN
 from truearm.doubts.of_results import (
@@ -29,6 +30,7 @@ from truearm.fits.details import ANOTHER_PLACE
 from truearm.fits.identifiability import BASE, SETUP
 from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
+from truearm.reporting.distance_ways import has_all_ways
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
@@ -369,7 +371,7 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
 
 
 def _along_distances(facts: Facts) -> Iterator[Advice]:
-    if facts.calibration.selection.distances:
+    if facts.calibration.selection.distances and not facts.noticed(ONE_ANCHOR) and not has_all_ways(facts):
         words = (
             "These errors are of distances, one coordinate of where the point is; those of positions are "
             "larger. Distances to further fixed points, in other directions, tell more of them."
@@ -378,11 +380,10 @@ def _along_distances(facts: Facts) -> Iterator[Advice]:
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
-    words = facts.calibration.validation.few
-    if words and facts.update is not None:
-        yield Advice("few_held_out", "Judge it on more poses.", words, 0.5 * facts.mean_mm())
-    elif words:
-        yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
+    if words := few_in_words(facts.calibration):
+        drawn = "Hold out more poses." if facts.update is None else "Judge it on more poses."
+        name = "Hold out a larger share." if is_of_a_range(facts.calibration) else drawn
+        yield Advice("few_held_out", name, words, 0.5 * facts.mean_mm())
 
 
 def _intervals(facts: Facts) -> Iterator[Advice]:

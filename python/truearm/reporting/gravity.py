@@ -10,7 +10,7 @@ from truearm.doubts.of_results import UPRIGHT
 from truearm.fits.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import percent, short
+from truearm.reporting.numbers import HARDLY_ANY, percent, short
 from truearm.reporting.parameters import chain_to_point
 from truearm.reporting.parts import Figure
 from truearm.rotations import rigid_motion
@@ -50,7 +50,7 @@ def sag(facts: Facts) -> Figure | None:
         "Vertical deviation, beyond what constants can take over",
         f"Its median is {near} mm close to the base and {far} mm far out. Vertical levers of the "
         f"links about the joints would explain {percent(share)} of the variance of all three coordinates, "
-        f"horizontal ones up to {percent(other)}. {_verdict(facts, moved, share, other)}.",
+        f"horizontal ones {_at_most(other)}. {_verdict(facts, moved, share, other)}.",
         [
             points(reach, height, facts.best),
             line(middles, medians, facts.best, line={"color": "@ink", "width": 2}),
@@ -60,6 +60,11 @@ def sag(facts: Facts) -> Figure | None:
             "yaxis": axis("vertical deviation, mm"),
         },
     )
+
+
+def _at_most(share: float) -> str:
+    said = percent(share)
+    return said if said == HARDLY_ANY else f"up to {said}"
 
 
 def _verdict(facts: Facts, moved: Floats, share: float, other: float) -> str:

@@ -22,7 +22,7 @@ WORST: Final = 12
 
 def held_errors(facts: Facts) -> Section:
     """Errors that were made on poses that took no part in fitting."""
-    title = f"Errors on {facts.judged} poses"
+    title = f"Errors on {facts.those_judged}"
     if facts.held is None:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
