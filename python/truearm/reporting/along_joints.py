@@ -116,9 +116,9 @@ class AlongJoints:
         """
         q, errors = self._known
         shares = [stretches(column, BINS, FEWEST_IN_BIN)[1] for column in q.T]
-        ranks = np.argsort(np.argsort(errors)) - 0.5 * (len(errors) - 1)
+        ranks: Floats = np.argsort(np.argsort(errors)).astype(np.float64) - 0.5 * (len(errors) - 1)
         rng = np.random.default_rng(SEED)
-        largest = [_apart(rng.permutation(ranks), shares).max() for _ in range(ORDERS)]
+        largest = [_apart(ranks[rng.permutation(len(ranks))], shares).max() for _ in range(ORDERS)]
         return np.asarray(_apart(ranks, shares) > np.quantile(largest, SURE))
 
 

@@ -19,14 +19,13 @@ def has_all_ways(facts: Facts) -> bool:
 
     Directions are those from the middle of the flange's places, in the base frame.
     """
-    rows = facts.calibration.rows
-    if rows is None or rows.data.anchor is None:
+    rows, setup, robot = facts.calibration.rows, facts.calibration.model.setup, facts.calibration.robot
+    if rows is None or (anchors := rows.data.anchor) is None:
         return False
-    data, robot, setup = rows.data, facts.calibration.robot, facts.calibration.model.setup
     middle = robot.flange_chain.pose(robot.joints_from_readings(facts.drawn(POSES)))[:, :3, 3].mean(axis=0)
-    groups, names = facts.calibration.groups, anchor_names(data)
+    groups, names = facts.calibration.groups, anchor_names(rows.data)
     ways = []
-    for group, anchor in sorted(set(zip(data.group.tolist(), data.anchor.tolist(), strict=True))):
+    for group, anchor in sorted(set(zip(rows.data.group.tolist(), anchors.tolist(), strict=True))):
         if anchor:
             frame = setup.frames[groups.index(group)]
             away = frame[:3, :3].T @ (setup.anchors[names.index(anchor)] - frame[:3, 3]) - middle
