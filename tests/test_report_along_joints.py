@@ -52,6 +52,7 @@ def test_a_pose_counts_once_along_the_joints_however_often_it_was_measured():
     readings = np.vstack([poses, np.repeat(poses[:6], 19, axis=0)])
     found = ta.calibrate(arm.robot, arm.measure(readings), model="constant", drift="none")
     held = found.held
+    assert held is not None
     assert len(held) // 8 >= 3
     made = report(found)
     says = dict(made.figures)["Error along joint 2"]

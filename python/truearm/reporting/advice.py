@@ -44,8 +44,8 @@ LENGTHS_SPREAD: Final = 0.42
 """Standard deviation of the length of a vector with three equal normal coordinates, over its mean."""
 SURE: Final = 3.0
 FEW_FOR_NOISE: Final = 5.0 / 3.0
-"""Training poses for each unknown, below which noise may be told a third or half of what it is: 60 of six joints
-in one set-up, 82 of seven. Orientations beside positions hardly help.
+"""Training poses for each unknown, below which noise may be told a third or half of what it is: 60 of an arm
+of six joints in one set-up, 82 of seven. Orientations beside positions hardly help.
 """
 OF_A_SETUP: Final = 9
 """Unknowns of a further set-up: its frame and its point."""
