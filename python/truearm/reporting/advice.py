@@ -389,10 +389,15 @@ def _along_distances(facts: Facts) -> Iterator[Advice]:
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
-    if words := few_in_words(facts.calibration):
-        drawn = "Hold out more poses." if facts.update is None else "Judge it on more poses."
-        name = "Hold out a larger share." if is_of_a_range(facts.calibration) else drawn
-        yield Advice("few_held_out", name, words, 0.5 * facts.mean_mm())
+    words, weight = few_in_words(facts.calibration), 0.5 * facts.mean_mm()
+    if not words:
+        return
+    if facts.update is not None:
+        yield Advice("few_held_out", "Judge it on more poses.", words, weight)
+    elif is_of_a_range(facts.calibration):
+        yield Advice("few_held_out", "Hold out a larger share.", words, weight)
+    else:
+        yield Advice("few_held_out", "Hold out more poses.", words, weight)
 
 
 def _intervals(facts: Facts) -> Iterator[Advice]:
