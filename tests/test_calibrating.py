@@ -217,6 +217,7 @@ def test_nothing_is_said_of_how_an_arm_stands_whose_axes_all_stand_upright():
     arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=0)
     data = arm.measure(arm.poses(90, seed=0), seed=0)
     calibration = ta.calibrate(arm.robot, data)
+    assert calibration.variable is not None
     assert calibration.variable.hyper["up"] == [0.0, 0.0, 1.0]
     assert "mounting" not in {notice.kind for notice in calibration.notices}
 

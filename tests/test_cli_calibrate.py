@@ -14,6 +14,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli import main
+from truearm.cli.calibrate import print_results
 from truearm.errors import WorkError
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
@@ -90,6 +91,24 @@ def test_planned_poses_are_held_out_and_a_stated_share_comes_first(folder, capsy
     assert "judged on 24 others." in capsys.readouterr().out
     assert main([*words, "--holdout", "0.4"]) == 0
     assert "another split" not in capsys.readouterr().out
+
+
+def test_where_a_range_is_held_out_its_share_is_named_and_no_other_split(folder, capsys):
+    words = ["calibrate", "rv-m2", "arm.csv", "-o", "range", "--model", "constant"]
+    assert main([*words, "--holdout-range", "q2:high:0.2"]) == 0
+    few = "which --holdout-range q2:high:0.2 holds out: a larger share would judge it on more."
+    printed = " ".join(capsys.readouterr().out.split())
+    assert few in printed
+    assert "another split" not in printed
+    told = {advice.kind: advice for advice in report(ta.Calibration.load("range/calibration.calib")).advice}
+    assert told["few_held_out"].name == "Hold out a larger share."
+    assert few in told["few_held_out"].words
+
+
+def test_one_epoch_is_one(folder, capsys):
+    data = ta.Measurements.from_dataframe(pd.read_csv("arm.csv"))
+    print_results(ta.calibrate(ta.Robot.load("rv-m2"), data, model="fcmac", epochs=1))
+    assert "Training, 1 epoch, " in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_summary_on_disk_and_on_stdout_is_one(folder, capsys):

@@ -124,6 +124,21 @@ def test_links_that_grow_with_a_temperature_name_its_column(arm):
     assert UNUSED_COLUMN not in used
 
 
+def test_a_joint_and_links_that_move_with_a_temperature_are_told_together_with_their_size(arm):
+    """As far as both move the target from the coldest row to the warmest, in the mean over the poses."""
+    swing = 10.0 * np.sin(np.arange(MANY) * 2.0 * np.pi / 15.0)
+    grown, turned = 2.0 * STEEL * swing, 7e-5 * np.outer(swing, np.eye(6)[1])
+    notices, _ = told(arm, turned, {"temperature_C": 20.0 + swing}, grown)
+    said = notices[UNUSED_COLUMN]
+    assert "as of joints that move and links that grow with it" in said
+    readings = arm.poses(MANY)
+    places = reached(arm, readings)
+    by = reached(arm, readings + np.ptp(swing) * 7e-5 * np.eye(6)[1]) - places
+    by += np.ptp(grown) * (places - places.mean(axis=0))
+    mm = 1e3 * np.linalg.norm(by, axis=1).mean()
+    assert float(said.split("(by ")[1].split(" mm")[0]) == pytest.approx(mm, rel=0.2)
+
+
 def test_an_arm_that_grows_while_it_is_measured_is_told_beside_the_drift_of_its_points(arm):
     warm = np.interp(np.linspace(0.0, 1.0, MANY), np.linspace(0.0, 1.0, ROWS), WARM)
     grown = 2.0 * STEEL * warm

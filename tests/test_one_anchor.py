@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -27,7 +28,21 @@ def test_one_fixed_point_is_told(anchors, told):
     notices = {notice.kind: notice.message for notice in found.notices}
     assert ("one_anchor" in notices) == told
     assert not told or "(wire 0)" in notices["one_anchor"]
-    assert ("one_anchor" in {advice.kind for advice in report(found).advice}) == told
+    kinds = {advice.kind for advice in report(found).advice}
+    assert ("one_anchor" in kinds) == told
+    assert "further_points" not in kinds
+
+
+def test_further_points_are_advised_where_distances_go_two_ways_and_told_as_distances():
+    found = ta.calibrate(ARM.robot, ta.Measurements.from_dataframe(measured(2)), model="constant")
+    made = report(found)
+    told = {advice.kind: advice.words for advice in made.advice}
+    assert "Distances to further fixed points, in other directions" in told["further_points"]
+    judged = f"{found.validation.n_holdout} held-out distances"
+    assert made.verdict.startswith(f"On {judged} the mean distance error is")
+    text = words_of(made.html)
+    assert f"Distance errors on {judged}, mm" in text
+    assert "mean error on held-out distances" in text
 
 
 def test_two_arms_or_an_arm_that_was_moved_have_a_point_each():

@@ -341,6 +341,7 @@ def test_levers_stand_out_where_links_give_way(compliance, words):
     assert made is not None
     assert words in made.says
     assert "weight" not in made.says
+    assert "up to less than" not in made.says
 
 
 def test_a_wave_is_found_and_a_line_is_none():

@@ -110,7 +110,6 @@ def test_a_report_on_distances_names_one_point_and_compares_no_error_with_it():
     assert "of the flange, as the robot file names no tool)" in text
     assert "robot file's tool" not in text
     assert "known worse" not in text
-    assert "Measure to further fixed points. These errors are of distances" in text
 
 
 def test_no_line_ends_within_the_name_of_an_option():
@@ -255,3 +254,26 @@ def test_in_the_modified_convention_targets_take_over_what_follows_the_last_axis
     found = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
     assert taken_over(Facts(found)) == {"theta7", "d7"}
     assert not {"a7", "alpha7"} & set(found.identifiability.undetermined)
+
+
+def test_regions_move_the_point_as_far_as_all_their_ceps_do_together():
+    """Against where the models have the measured point, the regions' and without their CEPs."""
+    found = small_calibration("regions")
+    made, readings = report(found), found.learned_from.data.readings
+    says = dict(made.figures)["The regions"]
+    values, chain = found.robot.joints_from_readings(readings), found.arm.chain(found.robot.flange)
+    ends = [chain.pose(values, each) for each in (found.model.parameters(values), found.model.constants)]
+    point = found.model.setup.targets[0, 0]
+    with_ceps, without = (end[:, :3, :3] @ point + end[:, :3, 3] for end in ends)
+    apart = 1e3 * np.linalg.norm(with_ceps - without, axis=1)
+    scheme = found.model.scheme
+    region = scheme.regions.find(np.ascontiguousarray(values[:, list(scheme.inputs)]))
+    of_regions = [np.sqrt(np.square(apart[region == k]).mean()) for k in np.unique(region)]
+    median, most = (float(number) for number in re.findall(r"(\d\.\d+) mm", says))
+    assert median == pytest.approx(np.median(of_regions), rel=0.3)
+    assert most == pytest.approx(np.max(of_regions), rel=0.3)
+    assert "-0 deg" not in says
+    place = [title for title, _ in made.figures].index("The regions")
+    marker = figures_of(made.html)["figures"][place]["traces"][0]["marker"]
+    assert marker["cmin"] == 0.0
+    assert marker["cmax"] == pytest.approx(max(marker["colors"]), rel=1e-3)

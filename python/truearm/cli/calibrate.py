@@ -247,6 +247,7 @@ def print_places(output: Path) -> None:
 def print_results(calibration: "Calibration") -> None:
     """Print what was determined, the errors, and what stands out."""
     from truearm.cli.error_tables import print_errors
+    from truearm.doubts.few_judged import few_in_words
     from truearm.outlier_fate import taken_out
 
     validation, summary = calibration.validation, calibration.summary
@@ -261,8 +262,8 @@ def print_results(calibration: "Calibration") -> None:
     print_errors(validation.holdout, _judged_in_words(calibration), calibration.selection.errors_of)
     if validation.drift is not None:
         say_wrapped(validation.drift.words)
-    if validation.few:
-        say_wrapped(validation.few)
+    if few := few_in_words(calibration):
+        say_wrapped(few)
     _print_noise(calibration, summary)
     if validation.coverage_95 is not None:
         inside = f"{100 * validation.coverage_95:.1f} %"
@@ -277,9 +278,11 @@ def print_results(calibration: "Calibration") -> None:
 
 def _judged_in_words(calibration: "Calibration") -> str:
     """How many were judged: rows, or poses where those are fewer, or distances, of which a pair has one."""
-    validation, held = calibration.validation, calibration.held
-    if calibration.selection.distances and held is not None:
-        return count_of(int(held.errors[calibration.model_name].measured.sum()), "held-out distance")
+    from truearm.storage.summary import judged_distances
+
+    validation = calibration.validation
+    if distances := judged_distances(calibration):
+        return distances
     if validation.n_holdout_poses < validation.n_holdout:
         return validation.poses_judged
     return count_of(validation.n_holdout, "held-out row")
@@ -287,6 +290,7 @@ def _judged_in_words(calibration: "Calibration") -> str:
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
+    from truearm.doubts.moved_words import TAKEN_FOR_NOISE
     from truearm.fits.models import CONSTANT, leaves_noise
     from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
     from truearm.storage.summary import states_sigma
@@ -301,11 +305,12 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     it = "With that sigma it" if beyond else "It"
     kept = bool(summary["outliers"]) and fate_of_outliers(calibration) == FULL_WEIGHT
     noise = "noise, the outliers" if kept else "noise"
-    alone = (
-        f"Mean error that noise alone would leave: {left}."
-        if leaves_noise(name)
-        else f"{it} makes a mean error of {left}: {noise} and, {also}, what varies with the joints."
-    )
+    if not leaves_noise(name):
+        alone = f"{it} makes a mean error of {left}: {noise} and, {also}, what varies with the joints."
+    elif any(notice.kind in TAKEN_FOR_NOISE for notice in calibration.notices):
+        alone = f"{it} makes a mean error of {left}: {noise}, and what is taken for it, as a warning says."
+    else:
+        alone = f"Mean error that noise alone would leave: {left}."
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
         f"{per}. {alone}"
@@ -345,7 +350,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
         say_wrapped(f"{of}{'' if kappa is None else f', condition number {kappa:.0f} in the median'}.")
     if details is not None and details.epochs is not None:
         left = f"{details.largest_left_mm:.3g} mm left at most (angles at 300 mm)"
-        say_wrapped(f"Training, {details.epochs} epochs, {left}: {details.ended}.")
+        say_wrapped(f"Training, {count_of(details.epochs, 'epoch')}, {left}: {details.ended}.")
     if ratios is not None:
         words = ", ".join(f"{name} {ratio:.1f}" for name, ratio in ratios.items())
         say_wrapped(f"Mean error in multiples of the repeatability: {words}.")

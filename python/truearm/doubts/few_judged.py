@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from truearm.doubts.of_results import LARGE_MM, NO_HELP, SURE, WOULD_FIT, these_first
 from truearm.doubts.outliers import EXCHANGED, NO_OUTLIERS, STATED_TOO_LARGE, Outliers
@@ -11,6 +11,9 @@ from truearm.fits.models import NOMINAL
 from truearm.judgement.held_rows import HeldRows
 from truearm.judgement.validation import FEW_HELD
 from truearm.lengths import length_mm
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
 
 UNDECIDED: Final = "undecided"
 KNOWN_REASONS: Final = {*EXCHANGED, *WOULD_FIT, STATED_TOO_LARGE}
@@ -71,3 +74,19 @@ class FewJudged:
             f"few. Measure more poses before it is used.{first}"
         )
         return [Notice(UNDECIDED, text) if notice.kind == NO_HELP else notice for notice in notices]
+
+
+def is_of_a_range(calibration: "Calibration") -> bool:
+    """Whether a range of a joint was held out, so that no draw decided which poses were judged."""
+    return calibration.options.split.holdout_range is not None and not calibration.validation.left_out
+
+
+def few_in_words(calibration: "Calibration") -> str:
+    """What is said where so few were judged that others would give other errors; empty elsewhere."""
+    validation = calibration.validation
+    if not (validation.few and is_of_a_range(calibration)):
+        return validation.few
+    return (
+        f"The errors above come from {validation.poses_judged}, which --holdout-range "
+        f"{calibration.options.split.holdout_range} holds out: a larger share would judge it on more."
+    )

@@ -16,6 +16,7 @@ from truearm.calibration import Calibration
 from truearm.doubts.asked_columns import Asked, asked_columns, each_set_up, is_in_order
 from truearm.doubts.at_once import JOINT_MOVED, SCALE_DIFFERS
 from truearm.doubts.moved_words import (
+    BOTH,
     DEVICE,
     JOINTS,
     LINKS,
@@ -38,6 +39,8 @@ from truearm.units import MM_PER_METRE
 
 MAY_BE_A_COLUMN: Final = (JOINT_MOVED, SCALE_DIFFERS)
 """Steps that something that was noted may be the reason of."""
+CLEARLY: Final = 3.0
+"""Logarithm of evidence by which joints and links together are told before either alone: 20 to one."""
 SOME_LEVELS: Final = 3
 """Set-ups that a column tells apart from which more may go with it than that one differs from the others."""
 
@@ -89,8 +92,17 @@ def _of_columns(found: Calibration, seen: Whitened, columns: Sequence[Asked]) ->
             lever = np.einsum("vaj,a->vj", seen.joints[:, :AXES], up)[:, None]
             yield _moved(seen, column, LOAD, seen.joints * lever)
         elif not column.levels or column.levels >= SOME_LEVELS:
-            yield _moved(seen, column, JOINTS, seen.joints)
-            yield _moved(seen, column, LINKS, seen.scaled[:, :, None])
+            yield from _of_arm(seen, column)
+
+
+def _of_arm(seen: Whitened, column: Asked) -> Iterator[Moved]:
+    """How joints and links move with a column: each alone, and both where that is clearly more evident."""
+    scaled = seen.scaled[:, :, None]
+    alone = _moved(seen, column, JOINTS, seen.joints), _moved(seen, column, LINKS, scaled)
+    both = _moved(seen, column, BOTH, np.concatenate([seen.joints, scaled], axis=2))
+    yield from alone
+    if both.gain > max(each.gain for each in alone) + CLEARLY:
+        yield both
 
 
 def _of_devices(found: Calibration, rows: FittedRows, seen: Whitened, progress: Floats) -> Iterator[Moved]:

@@ -15,22 +15,36 @@ UNUSED_COLUMN: Final = "unused_column"
 JOINTS_MOVED: Final = "joints_moved"
 LINKS_GREW: Final = "links_grew"
 SETUP_TURNING: Final = "setup_turning"
+TAKEN_FOR_NOISE: Final = (UNUSED_COLUMN, JOINTS_MOVED, LINKS_GREW, SETUP_TURNING)
+"""Kinds of notices of what a model takes for noise, so that what it leaves is more than noise."""
 JOINTS: Final = "joints"
 LINKS: Final = "links"
+BOTH: Final = "joints and links"
 LOAD: Final = "load"
 DEVICE: Final = "device"
 KNOWN: Final = "known where programs run, as a temperature is and a time is not"
 AS_OF: Final = {
     JOINTS: "joints that move with it",
     LINKS: "links that grow with it, or an instrument whose scale changes with it",
+    BOTH: "joints that move and links that grow with it",
     LOAD: "joints that give way under it",
 }
-MOVES: Final = {JOINTS: "moves the joints", LINKS: "lengthens the links", LOAD: "moves the joints"}
+MOVES: Final = {
+    JOINTS: "moves the joints",
+    LINKS: "lengthens the links",
+    BOTH: "moves the joints and lengthens the links",
+    LOAD: "moves the joints",
+}
 ORDERED: Final = "Rows are taken to be in the order of measuring: if they are not, give --drift none."
 MEANWHILE: Final = {
     JOINTS: (
         JOINTS_MOVED,
         "The joints moved while they were measured, whatever the pose, as those of an arm that warms up",
+    ),
+    BOTH: (
+        JOINTS_MOVED,
+        "The joints moved and all lengths changed while they were measured, whatever the pose, as those of "
+        "an arm that warms up",
     ),
     LINKS: (
         LINKS_GREW,
@@ -48,11 +62,12 @@ class Moved:
 
     Attributes:
         column: The column.
-        what: What moves: JOINTS, LINKS, joints under a LOAD, or the DEVICE.
+        what: What moves: JOINTS, LINKS, BOTH, joints under a LOAD, or the DEVICE.
         chance: How likely chance explains as much.
         gain: Logarithm of its evidence over that of none.
         mean_mm: How far the target moves on average, from the lowest value to the highest.
-        sizes: By how much (k,), rad and m for joints, in parts of one for lengths, rad for a device.
+        sizes: By how much (k,), rad and m for joints, in parts of one for lengths, behind these of both, rad
+            for a device.
         group: The set-up whose device it is.
     """
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -12,8 +13,8 @@ from truearm.arrays import hold_read_only
 from truearm.errors import count_of, list_names
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
-from truearm.rows.visits import pose_numbers
-from truearm.types import Floats
+from truearm.rows.visits import means, pose_numbers
+from truearm.types import Floats, Rows
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Arrays = dict[str, NDArray[Any]]
@@ -59,6 +60,16 @@ class HeldRows:
         named = {(entry["file"], entry["row"]) for entry in outliers}
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([row not in named for row in own], dtype=bool)
+
+    @cached_property
+    def poses(self) -> Rows:
+        """Internal: number of each row's pose (n,), from 0; shots of a pose have one."""
+        _, number = np.unique(pose_numbers(self.readings, self.sources), return_inverse=True)
+        return number
+
+    def by_pose(self, values: Floats) -> Floats:
+        """Internal: mean of values (n, ...) over the rows of each pose (p, ...), NaN where none is known."""
+        return means(values, self.poses)
 
     def sigmas_mm(self, data: Measurements) -> Floats:
         """Internal: what each of these rows states as its sigma (n,), mm; zero where it states none."""
@@ -116,16 +127,12 @@ class HeldRows:
         Outliers, given with file and row, are left out; shots of a pose count once. Nothing is told by less
         than two poses: the standard error is infinite then.
         """
-        kept = self.without(outliers)
-        near, far = (MM_PER_METRE * self.errors[name].distance_m[kept] for name in (ahead, behind))
-        apart = far - near
-        _, place = np.unique(pose_numbers(self.readings[kept], self.sources[kept]), return_inverse=True)
-        seen = np.isfinite(apart)
-        counts = np.bincount(place[seen])
-        means = np.bincount(place[seen], apart[seen])[counts > 0] / counts[counts > 0]
-        if len(means) < FEWEST_POSES:
+        near, far = (MM_PER_METRE * self.errors[name].distance_m for name in (ahead, behind))
+        apart = self.by_pose(np.where(self.without(outliers), far - near, np.nan))
+        apart = apart[np.isfinite(apart)]
+        if len(apart) < FEWEST_POSES:
             return 0.0, math.inf
-        return float(means.mean()), float(means.std(ddof=1) / math.sqrt(len(means)))
+        return float(apart.mean()), float(apart.std(ddof=1) / math.sqrt(len(apart)))
 
     def pack(self, arrays: Arrays) -> dict[str, Any]:
         """Internal: JSON values; arrays are added to `arrays`."""

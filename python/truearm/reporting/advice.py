@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from truearm.doubts.at_once import SETUP_TURNED, STEP_KINDS
+from truearm.doubts.few_judged import few_in_words, is_of_a_range
 from truearm.doubts.grids import BETWEEN
 from truearm.doubts.moved_words import JOINTS_MOVED, LINKS_GREW, SETUP_TURNING, UNUSED_COLUMN
 from truearm.doubts.of_results import (
@@ -29,6 +30,7 @@ from truearm.fits.details import ANOTHER_PLACE
 from truearm.fits.identifiability import BASE, SETUP
 from truearm.fits.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.outlier_fate import FULL_WEIGHT
+from truearm.reporting.distance_ways import has_all_ways
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
@@ -41,8 +43,12 @@ AT_THE_FLOOR: Final = 1.25
 LENGTHS_SPREAD: Final = 0.42
 """Standard deviation of the length of a vector with three equal normal coordinates, over its mean."""
 SURE: Final = 3.0
-FEW_FOR_NOISE: Final = 60
-"""Training poses below which noise may be told a third or half of what it is."""
+FEW_FOR_NOISE: Final = 5.0 / 3.0
+"""Training poses for each unknown, below which noise may be told a third or half of what it is: 60 of an arm
+of six joints in one set-up, 82 of seven. Orientations beside positions hardly help.
+"""
+OF_A_SETUP: Final = 9
+"""Unknowns of a further set-up: its frame and its point."""
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
@@ -176,7 +182,9 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if not leaves_noise(facts.best) or facts.changed_meanwhile or any(_stated_sigma(facts)):
+    if not leaves_noise(facts.best) or facts.leaves_more_than_noise:
+        return
+    if facts.changed_meanwhile or any(_stated_sigma(facts)):
         return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
@@ -192,7 +200,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     trained = facts.calibration.validation.poses_trained
     unsure = (
         ", though so few poses hardly tell noise from what the model misses"
-        if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE
+        if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE * _unknowns(facts)
         else ""
     )
     words = (
@@ -200,6 +208,11 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         f"than noise is what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _unknowns(facts: Facts) -> int:
+    """How many numbers poses have to tell from noise, about: errors of each joint vary with each."""
+    return len(facts.joints) ** 2 + OF_A_SETUP * (len(facts.calibration.groups) - 1)
 
 
 def _least_by_chance(facts: Facts) -> float:
@@ -367,7 +380,7 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
 
 
 def _along_distances(facts: Facts) -> Iterator[Advice]:
-    if facts.calibration.selection.distances:
+    if facts.calibration.selection.distances and not facts.noticed(ONE_ANCHOR) and not has_all_ways(facts):
         words = (
             "These errors are of distances, one coordinate of where the point is; those of positions are "
             "larger. Distances to further fixed points, in other directions, tell more of them."
@@ -376,11 +389,15 @@ def _along_distances(facts: Facts) -> Iterator[Advice]:
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
-    words = facts.calibration.validation.few
-    if words and facts.update is not None:
-        yield Advice("few_held_out", "Judge it on more poses.", words, 0.5 * facts.mean_mm())
-    elif words:
-        yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
+    words, weight = few_in_words(facts.calibration), 0.5 * facts.mean_mm()
+    if not words:
+        return
+    if facts.update is not None:
+        yield Advice("few_held_out", "Judge it on more poses.", words, weight)
+    elif is_of_a_range(facts.calibration):
+        yield Advice("few_held_out", "Hold out a larger share.", words, weight)
+    else:
+        yield Advice("few_held_out", "Hold out more poses.", words, weight)
 
 
 def _intervals(facts: Facts) -> Iterator[Advice]:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from truearm.reporting.numbers import lean
 from truearm.reporting.style import PLAIN, SEQUENTIAL, colour_of, dash_of, marker_of
-from truearm.types import Floats
+from truearm.types import Floats, Rows
 
 Trace = dict[str, Any]
 
@@ -98,17 +98,27 @@ def colour_bar(title: str) -> dict[str, Any]:
     }
 
 
-def running_median(x: Floats, y: Floats, bins: int, fewest: int) -> tuple[Floats, Floats, Floats]:
-    """Edges (b + 1,) of equal shares of x, and medians (b,) of x and y in each; fewer where rows are few."""
+def stretches(x: Floats, bins: int, fewest: int) -> tuple[Floats, Rows]:
+    """Edges (b + 1,) of equal shares of x (n,), and the share that each is in (n,).
+
+    None is empty; they are fewer where x are few.
+    """
     count = max(1, min(bins, len(x) // fewest))
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, count + 1)))
     if len(edges) < 2:
-        return edges.repeat(2)[:2], np.array([x.mean()]), np.array([np.median(y)])
+        return edges.repeat(2), np.zeros(len(x), dtype=np.int64)
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    filled = [k for k in range(len(edges) - 1) if (place == k).any()]
-    edges = np.append(edges[filled], edges[-1])
-    middles = np.array([np.median(x[place == k]) for k in filled])
-    return edges, middles, np.array([np.median(y[place == k]) for k in filled])
+    filled, place = np.unique(place, return_inverse=True)
+    return np.append(edges[filled], edges[-1]), place
+
+
+def running_median(x: Floats, y: Floats, bins: int, fewest: int) -> tuple[Floats, Floats, Floats]:
+    """Edges (b + 1,) of equal shares of x (n,), and medians (b,) of x and y (n,) in each."""
+    edges, place = stretches(x, bins, fewest)
+    middles, medians = (
+        np.array([np.median(values[place == k]) for k in range(len(edges) - 1)]) for values in (x, y)
+    )
+    return edges, middles, medians
 
 
 def data_points(x: ArrayLike, y: ArrayLike, **more: Any) -> Trace:

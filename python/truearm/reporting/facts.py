@@ -13,6 +13,7 @@ from truearm.description.one_turn import one_turn
 from truearm.doubts.at_once import STEP_KINDS
 from truearm.doubts.few_judged import UNDECIDED, FewJudged
 from truearm.doubts.grids import grid_steps, grid_words
+from truearm.doubts.moved_words import TAKEN_FOR_NOISE
 from truearm.doubts.of_results import ON_A_GRID, SINGLE_ROWS, helps, nothing_to_gain
 from truearm.doubts.outliers import NO_OUTLIERS, Outliers, judged_means_mm
 from truearm.evaluation import Evaluation
@@ -21,7 +22,7 @@ from truearm.fits.stillness import still_warning
 from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.reporting.waypoints import Waypoints
-from truearm.storage.summary import WAVE, distance_at_floor_mm
+from truearm.storage.summary import WAVE, distance_at_floor_mm, judged_distances
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
@@ -70,8 +71,13 @@ class Facts:
 
     @property
     def poses_judged(self) -> str:
-        """How many they are: "832 held-out poses"."""
-        return self.calibration.validation.poses_judged
+        """How many they are: "832 held-out poses", or "36 held-out distances"."""
+        return judged_distances(self.calibration) or self.calibration.validation.poses_judged
+
+    @property
+    def those_judged(self) -> str:
+        """What errors are of: "held-out poses" or "held-out distances"."""
+        return f"{self.judged} {'distances' if self.calibration.selection.distances else 'poses'}"
 
     @property
     def counted(self) -> str:
@@ -248,6 +254,11 @@ class Facts:
     def changed_meanwhile(self) -> bool:
         """Whether something stood otherwise from some measured row on."""
         return any(map(self.noticed, STEP_KINDS))
+
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the model took for noise what moved with a column, or meanwhile."""
+        return any(map(self.noticed, TAKEN_FOR_NOISE))
 
     @cached_property
     def still(self) -> str:

@@ -10,7 +10,8 @@ from truearm.doubts.of_results import UPRIGHT
 from truearm.fits.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import percent, short
+from truearm.reporting.numbers import HARDLY_ANY, percent, short
+from truearm.reporting.parameters import chain_to_point
 from truearm.reporting.parts import Figure
 from truearm.rotations import rigid_motion
 from truearm.types import Floats
@@ -49,7 +50,7 @@ def sag(facts: Facts) -> Figure | None:
         "Vertical deviation, beyond what constants can take over",
         f"Its median is {near} mm close to the base and {far} mm far out. Vertical levers of the "
         f"links about the joints would explain {percent(share)} of the variance of all three coordinates, "
-        f"horizontal ones up to {percent(other)}. {_verdict(facts, moved, share, other)}.",
+        f"horizontal ones {_at_most(other)}. {_verdict(facts, moved, share, other)}.",
         [
             points(reach, height, facts.best),
             line(middles, medians, facts.best, line={"color": "@ink", "width": 2}),
@@ -59,6 +60,11 @@ def sag(facts: Facts) -> Figure | None:
             "yaxis": axis("vertical deviation, mm"),
         },
     )
+
+
+def _at_most(share: float) -> str:
+    said = percent(share)
+    return said if said == HARDLY_ANY else f"up to {said}"
 
 
 def _verdict(facts: Facts, moved: Floats, share: float, other: float) -> str:
@@ -100,17 +106,10 @@ def _moved_mm(facts: Facts, poses: Floats) -> Floats:
     return np.asarray(MM_PER_METRE * (places[0] - places[1]) @ axes)
 
 
-def _chain(facts: Facts) -> Chain:
-    """The chain to the measured point."""
-    end = np.eye(4)
-    end[:3, 3] = facts.point
-    return facts.calibration.arm.chain(facts.calibration.robot.flange @ end)
-
-
 def _taken_over(facts: Facts, poses: Floats) -> Floats:
     """Orthonormal directions (3 n, k) of what constants, frame and target do to the measured point."""
     arm, robot = facts.calibration.arm, facts.calibration.robot
-    values, chain = robot.joints_from_readings(poses), _chain(facts)
+    values, chain = robot.joints_from_readings(poses), chain_to_point(facts)
     pose = chain.pose(values)
     constants = chain.parameter_jacobian(values)[:, :, list(arm.candidates.columns)]
     columns = np.concatenate([constants, rigid_motion(pose[:, :3, 3]), pose[:, :3, :3]], axis=2)
@@ -125,7 +124,7 @@ def _without(directions: Floats, values: Floats) -> Floats:
 def _giving_way(facts: Facts, poses: Floats, up: Floats) -> Floats:
     """Displacement (3 n, c) of the measured point: joints comply with the levers of links behind them."""
     values = facts.calibration.robot.joints_from_readings(poses)
-    moved = _chain(facts).joint_jacobian(values)
+    moved = chain_to_point(facts).joint_jacobian(values)
     found = []
     for link in _links(facts):
         behind = link.joint_count
@@ -144,7 +143,7 @@ def _links(facts: Facts) -> Iterator[Chain]:
 
 def _reach_mm(facts: Facts, poses: Floats, up: Floats) -> Floats:
     """Distance of the measured point from the vertical through the base's origin (n,)."""
-    place = _chain(facts).position(facts.calibration.robot.joints_from_readings(poses))
+    place = chain_to_point(facts).position(facts.calibration.robot.joints_from_readings(poses))
     return np.asarray(MM_PER_METRE * np.linalg.norm(place - np.outer(place @ up, up), axis=1))
 
 

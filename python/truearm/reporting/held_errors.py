@@ -7,8 +7,9 @@ import numpy as np
 
 from truearm.errors import count_of, short_names
 from truearm.judgement.held_rows import HeldRows
-from truearm.reporting.charts import axis, legend, line, log_axis, points, running_median
-from truearm.reporting.facts import Facts
+from truearm.reporting.along_joints import AlongJoints, drawable, ends
+from truearm.reporting.charts import axis, legend, line, log_axis
+from truearm.reporting.facts import ROWS, Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.reporting.style import colour_of, dash_of
@@ -16,22 +17,12 @@ from truearm.types import Floats
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 BINS: Final = 32
-DRAWN: Final = 1500
-"""More points than these are not told apart."""
-JOINT_BINS: Final = 12
-FEWEST_IN_BIN: Final = 8
-FEWEST_STRETCHES: Final = 3
-"""Medians over a joint that are compared, and joined by a line."""
-STANDS_OUT: Final = 1.35
-"""A stretch of a joint whose median error is so many times that of all is named."""
 WORST: Final = 12
-SMALLEST: Final = 1e-4
-"""In mm or mrad: smaller errors are drawn there."""
 
 
 def held_errors(facts: Facts) -> Section:
     """Errors that were made on poses that took no part in fitting."""
-    title = f"Errors on {facts.judged} poses"
+    title = f"Errors on {facts.those_judged}"
     if facts.held is None:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
@@ -39,12 +30,14 @@ def held_errors(facts: Facts) -> Section:
         histogram(errors, facts.counted),
         cumulative(errors, facts.counted, _kept(facts, errors)),
     ]
+    several = " A pose that was measured several times has their mean." if facts.counted == ROWS else ""
     words = (
         "Along the joints, lines are medians over stretches with equally many poses, and dots are errors of "
-        f"the {facts.best} model; where poses are too few for lines, all models have dots."
+        f"the {facts.best} model; where poses are too few for lines, all models have dots.{several}"
     )
     parts.append(Text(words, is_note=True))
-    parts += [along_joint(facts, joint) for joint in range(len(facts.joints))]
+    along = AlongJoints.of(facts, facts.held)
+    parts += [along.figure(joint) for joint in range(len(facts.joints))]
     parts += orientation(facts)
     return Section(title, [*parts, worst(facts.held, facts)])
 
@@ -63,14 +56,10 @@ def _without_rows(facts: Facts) -> str:
     )
 
 
-def _known(errors: Floats) -> Floats:
-    return np.maximum(errors[np.isfinite(errors)], SMALLEST)
-
-
 def histogram(errors: Mapping[str, Floats], counted: str) -> Figure:
     """Shares of the poses or rows, as `counted` says, over logarithmic classes of errors (n,) in mm."""
-    known = {name: _known(values) for name, values in errors.items()}
-    low, high = _ends(known)
+    known = {name: drawable(values) for name, values in errors.items()}
+    low, high = ends(known)
     edges = np.geomspace(low, high, BINS + 1)
     traces = []
     for name, values in known.items():
@@ -99,8 +88,8 @@ def cumulative(
     """Share of the poses or rows, as `counted` says, below each error (n,) in mm; `without` are those (k,)
     without outliers, where these are told.
     """
-    known = {name: np.sort(_known(values)) for name, values in errors.items()}
-    low, high = _ends(known)
+    known = {name: np.sort(drawable(values)) for name, values in errors.items()}
+    low, high = ends(known)
     traces = []
     for name, values in known.items():
         share = 100.0 * np.arange(1, len(values) + 1) / len(values)
@@ -136,60 +125,6 @@ def _bounds(errors: Mapping[str, Floats], kept: Mapping[str, Floats], unit: str)
     return ", without the outliers below ".join(words)
 
 
-def _ends(known: Mapping[str, Floats]) -> tuple[float, float]:
-    values = np.concatenate(list(known.values()))
-    return float(np.quantile(values, 0.002)) / 1.1, float(values.max()) * 1.1
-
-
-def along_joint(facts: Facts, joint: int) -> Figure:
-    """Error over the readings of one joint, counted from 0."""
-    held = facts.held
-    if held is None:
-        raise ValueError("there are no held-out rows")
-    q = facts.shown(held.readings)[:, joint]
-    unit, name = facts.unit(joint), facts.best
-    traces, shown = [], {}
-    for model in facts.models:
-        errors = facts.errors_mm[model]
-        known = np.isfinite(errors)
-        _, middles, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
-        has_line = len(middles) >= FEWEST_STRETCHES
-        if model == name or not has_line:
-            single = _known(errors)[:DRAWN]
-            traces.append(points(q[known][:DRAWN], single, model, faint=has_line, showlegend=not has_line))
-            shown[f"{model}, points"] = single
-        if has_line:
-            traces.append(line(middles, medians, model))
-            shown[model] = _known(medians)
-    return Figure(
-        f"Error along joint {joint + 1}",
-        _where_along(q, facts.errors_mm[name], unit),
-        traces,
-        legend(
-            xaxis=axis(f"joint {joint + 1}, {unit}"),
-            yaxis=log_axis("position error, mm (logarithmic)", *_ends(shown)),
-        ),
-        height=290,
-    )
-
-
-def _where_along(q: Floats, errors: Floats, unit: str) -> str:
-    known = np.isfinite(errors)
-    edges, _, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
-    overall = float(np.median(errors[known]))
-    worst_bin = int(np.argmax(medians))
-    here, everywhere = short(float(medians[worst_bin]), overall)
-    if len(medians) < FEWEST_STRETCHES:
-        return f"Too few poses to compare stretches of the joint; the median is {everywhere} mm."
-    if medians[worst_bin] < STANDS_OUT * overall:
-        return (
-            f"No stretch of the joint stands out: the largest median of one is {here} mm, that of all poses "
-            f"{everywhere} mm."
-        )
-    stretch = f"{fixed(edges[worst_bin], 0)} and {fixed(edges[worst_bin + 1], 0)} {unit}"
-    return f"Largest between {stretch}: the median there is {here} mm, that of all poses {everywhere} mm."
-
-
 def orientation(facts: Facts) -> list[Figure]:
     """Cumulative curves of the orientation's errors, where it was measured."""
     if facts.held is None:
@@ -199,7 +134,7 @@ def orientation(facts: Facts) -> list[Figure]:
         for name, found in facts.held.errors.items()
         if found.orientation is not None
     }
-    known = {name: np.sort(_known(values)) for name, values in turned.items()}
+    known = {name: np.sort(drawable(values)) for name, values in turned.items()}
     if not known or min(map(len, known.values())) == 0:
         return []
     traces = [
@@ -212,7 +147,7 @@ def orientation(facts: Facts) -> list[Figure]:
         f"95 % of the {facts.counted} have an orientation error below {_bounds(known, kept, 'mrad')}.",
         traces,
         legend(
-            xaxis=log_axis("orientation error, mrad (logarithmic)", *_ends(known)),
+            xaxis=log_axis("orientation error, mrad (logarithmic)", *ends(known)),
             yaxis=axis(f"{facts.counted} with a smaller error, %", range=[0, 101]),
         ),
     )

@@ -13,6 +13,7 @@ from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 LEAST_TOLD: Final = 1e-6
 DECIMALS: Final = 3
 CHANGE_DECIMALS: Final = 4
+HARDLY_ANY: Final = "less than 1 %"
 DIGITS: Final = 4
 """Significant digits of what figures are drawn from: finer than a pixel."""
 
@@ -69,7 +70,7 @@ def significant(value: float) -> str:
 
 def percent(share: float) -> str:
     """A share in percent: "64 %"; of one that is hardly any, "less than 1 %"."""
-    return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
+    return HARDLY_ANY if share < 0.005 else f"{100.0 * share:.0f} %"
 
 
 def probability(p: float) -> str:

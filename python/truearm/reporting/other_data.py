@@ -72,7 +72,7 @@ def other_data(facts: Facts) -> Section:
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "
-        f"{facts.judged} poses of its own data{apart}.{no_help}",
+        f"{facts.those_judged} of its own data{apart}.{no_help}",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]

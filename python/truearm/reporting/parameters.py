@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm._core import Chain
 from truearm.certainty.standard_errors import of_covariance
 from truearm.errors import count_of
 from truearm.fits.models import CONSTANT
@@ -105,9 +106,13 @@ def standard_errors(facts: Facts) -> dict[str, float]:
 def effect_mm(facts: Facts) -> Floats:
     """How far one rad or m of each parameter moves the judged point (5 L,), mm, RMS over poses."""
     poses = facts.drawn(POSES)
-    chain = facts.calibration.arm.chain(facts.calibration.robot.flange @ shifted(facts.point))
-    jacobian = chain.parameter_jacobian(facts.calibration.robot.joints_from_readings(poses))
+    jacobian = chain_to_point(facts).parameter_jacobian(facts.calibration.robot.joints_from_readings(poses))
     return np.asarray(MM_PER_METRE * np.sqrt(np.square(jacobian).sum(axis=1).mean(axis=0)))
+
+
+def chain_to_point(facts: Facts) -> Chain:
+    """The identified chain, to the judged point."""
+    return facts.calibration.arm.chain(facts.calibration.robot.flange @ shifted(facts.point))
 
 
 def shifted(point: Floats) -> Floats:

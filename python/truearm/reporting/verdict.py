@@ -146,16 +146,21 @@ def cards(facts: Facts) -> list[Card]:
     was = before.mean if facts.update is None else facts.update["before"]["mean_mm"]
     mean, p95, former = short(after.mean, after.p95, was)
     found = [
-        Card(mean, "mm", f"mean error on {facts.judged} poses; {_former(facts)} {former}", tone(facts)),
+        Card(mean, "mm", f"mean error on {facts.those_judged}; {_former(facts)} {former}", tone(facts)),
         *_card_without_outliers(facts),
     ]
     if several := validation.n_holdout_poses > 1:
-        found.append(Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"))
+        found.append(Card(p95, "mm", f"95 % of the {facts.those_judged} have a smaller error"))
     tells_noise = not (facts.is_of_no_help or facts.changed_meanwhile)
     if leaves_noise(facts.best) and tells_noise:
         floor = facts.floor_mm
         together = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
-        found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{together}"))
+        of = (
+            "of what the model does not explain"
+            if facts.leaves_more_than_noise
+            else "that noise alone would leave"
+        )
+        found.append(Card(*_short_mm(floor), f"mean error {of}{together}"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
         found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
