@@ -213,15 +213,6 @@ def test_an_arm_on_a_wall_is_recognised_by_how_it_gives_way():
     np.testing.assert_allclose(again.position_std(q), calibration.position_std(q), rtol=1e-6)
 
 
-def test_nothing_is_said_of_how_an_arm_stands_whose_axes_all_stand_upright():
-    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=0)
-    data = arm.measure(arm.poses(90, seed=0), seed=0)
-    calibration = ta.calibrate(arm.robot, data)
-    assert calibration.variable is not None
-    assert calibration.variable.hyper["up"] == [0.0, 0.0, 1.0]
-    assert "mounting" not in {notice.kind for notice in calibration.notices}
-
-
 def test_threads_are_counted_from_one(variable):
     arm, data, _ = variable
     with pytest.raises(ta.UsageError, match="-1 threads"):

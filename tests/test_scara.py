@@ -48,3 +48,12 @@ def test_distances_between_poses_say_nothing_of_a_scara_s_target_along_its_axes(
             assert np.abs(model.setup.targets).max() < 0.3
         errors = found.validation.holdout
         assert errors["constant"].position.mean < 0.3 * errors["nominal"].position.mean
+
+
+def test_nothing_is_said_of_how_an_arm_stands_whose_axes_all_stand_upright():
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=0)
+    data = arm.measure(arm.poses(90, seed=0), seed=0)
+    calibration = ta.calibrate(arm.robot, data)
+    assert calibration.variable is not None
+    assert calibration.variable.hyper["up"] == [0.0, 0.0, 1.0]
+    assert "mounting" not in {notice.kind for notice in calibration.notices}
