@@ -13,11 +13,13 @@ from tests.cell_support import cell_text
 from tests.stages import Stages
 from tests.xyzc import xyzc
 from truearm.cell import Cell
+from truearm.cell.motion import Motion
 from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
+from truearm.cell.plan import measurable_pool
 from truearm.cell.poses_file import Poses
 from truearm.cell.rehearsal import rehearse
 from truearm.cli import main
-from truearm.planning.accessibility import lowest
+from truearm.planning.accessibility import InBox, lowest
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 
@@ -113,12 +115,19 @@ def test_each_target_that_the_calibration_found_stays_in_the_room(tmp_path, caps
         (["--box-mm", "0,0,0,1,1,-1"], "the lowest x, y, z and then the highest"),
         (["--floor-mm", "nan"], "--floor-mm: nan. It must be finite"),
         (["--floor-mm", "9000"], "0 of 20000 random poses can be measured"),
-        (["--floor-mm", "9000"], "each rule alone allows: AboveFloor 0, ClearOfItself 1"),
+        (["--floor-mm", "9000"], "each rule alone allows: the floor 0, links clear of one another 1"),
     ],
 )
 def test_a_room_that_is_none_is_told(words, message, tmp_path, capsys):
     assert main(["plan", "ur10", "-n", "20", "-o", str(tmp_path / "poses.csv"), *words]) != 0
     assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_rules_are_counted_where_joints_are_held():
+    box = InBox((-1.2, -1.2, 0.1), (1.2, 1.2, 0.5))
+    motion = Motion.of(ta.Robot.load("ur10"), None, [box], [np.eye(4)], 0.0)
+    with pytest.raises(ta.WorkError, match="each rule alone allows: the box 0. "):
+        measurable_pool(motion, 400, 0, {2: -np.pi / 2.0, 3: 0.0})
 
 
 def test_poses_of_another_plan_are_written_over_only_where_their_file_is_named(tmp_path, capsys, monkeypatch):

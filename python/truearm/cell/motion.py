@@ -1,9 +1,9 @@
 """How the arm of a plan gets from pose to pose: past a table, within rules, in which order of steps."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,12 +15,19 @@ from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.errors import InputError
-from truearm.planning.accessibility import Rule, accessible, lowest, name_of
+from truearm.planning.accessibility import AboveFloor, InBox, Rule, accessible, lowest, name_of
 from truearm.planning.folding import ClearOfItself
 from truearm.planning.joint_ways import JointWays
 from truearm.robot import Robot
 from truearm.types import Floats, Mask
 from truearm.units import MM_PER_METRE, to_si
+
+IN_WORDS: Final[Mapping[type, str]] = {
+    AboveFloor: "the floor",
+    InBox: "the box",
+    ClearOfItself: "links clear of one another",
+}
+"""What people who give rules by options call them."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +130,8 @@ class Motion:
         found = []
         for rule in self.rules:
             masks = [accessible(self.arm, readings, [rule], tool=tool) for tool in self.tools]
-            found.append((name_of(rule), int(np.count_nonzero(np.all(masks, axis=0)))))
+            name = IN_WORDS.get(type(rule)) or name_of(rule)
+            found.append((name, int(np.count_nonzero(np.all(masks, axis=0)))))
         return sorted(found, key=lambda each: each[1])
 
     def walk(self) -> "Walk | FreeWalk":

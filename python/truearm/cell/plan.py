@@ -232,9 +232,7 @@ def measurable_pool(motion: Motion, size: int, seed: int, held: Mapping[int, flo
     prediction = None if cell is None else Prediction(cell)
     found: list[Floats] = []
     drawn = 0
-    for block in _drawn(motion, seed):
-        for joint, reading in held.items():
-            block[:, joint - 1] = reading
+    for block in _drawn(motion, seed, held):
         for readings in block[motion.allowed(block)]:
             step = Step(0, "pose", 0, "", 0, readings)
             if cell is None or prediction is None or not problem_of(cell, prediction, step):
@@ -246,25 +244,28 @@ def measurable_pool(motion: Motion, size: int, seed: int, held: Mapping[int, flo
             break
     raise WorkError(
         f"{len(found)} of {drawn} random poses can be measured",
-        rule=f"A pool of {size} is needed{_told_of_rules(motion, seed)}",
+        rule=f"A pool of {size} is needed{_told_of_rules(motion, seed, held)}",
         way_out=f"Look at {'' if cell is None else OF_CELL}--floor-mm, --box-mm, --link-radius-mm and the "
         "joints' limits, or ask for fewer poses",
     )
 
 
-def _told_of_rules(motion: Motion, seed: int) -> str:
+def _told_of_rules(motion: Motion, seed: int, held: Mapping[int, float]) -> str:
     """What each rule alone makes of the first poses that are drawn, in words; "" where there are no rules."""
-    first = next(_drawn(motion, seed))
+    first = next(_drawn(motion, seed, held))
     told = ", ".join(f"{name} {count}" for name, count in motion.allowed_by_each(first))
     return told and f"; of {len(first)} of them each rule alone allows: {told}"
 
 
-def _drawn(motion: Motion, seed: int) -> Iterator[Floats]:
-    """Readings (DRAWN_AT_ONCE, N) within the limits and one turn, MOST_DRAWS in all."""
+def _drawn(motion: Motion, seed: int, held: Mapping[int, float]) -> Iterator[Floats]:
+    """Readings (DRAWN_AT_ONCE, N) within the limits and one turn, or as held, MOST_DRAWS in all."""
     rng, arm = np.random.default_rng(seed), motion.arm
     low, high = motion.run_up.room(*one_turn(arm))
     for _ in range(MOST_DRAWS // DRAWN_AT_ONCE):
-        yield rng.uniform(low, high, (DRAWN_AT_ONCE, arm.joint_count))
+        block = rng.uniform(low, high, (DRAWN_AT_ONCE, arm.joint_count))
+        for joint, reading in held.items():
+            block[:, joint - 1] = reading
+        yield block
 
 
 def _with_others(pool: Floats, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:

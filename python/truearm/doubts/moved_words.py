@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.doubts.asked_columns import ORDER, Asked
-from truearm.doubts.at_once import SCALE_DIFFERS
+from truearm.doubts.at_once import SCALE_DIFFERS, STEP_KINDS
+from truearm.doubts.outliers import STATED_TOO_LARGE
 from truearm.doubts.slips import mrad
 from truearm.errors import Notice, count_of
 from truearm.lengths import length_mm
@@ -15,7 +16,14 @@ UNUSED_COLUMN: Final = "unused_column"
 JOINTS_MOVED: Final = "joints_moved"
 LINKS_GREW: Final = "links_grew"
 SETUP_TURNING: Final = "setup_turning"
-TAKEN_FOR_NOISE: Final = (UNUSED_COLUMN, JOINTS_MOVED, LINKS_GREW, SETUP_TURNING)
+TAKEN_FOR_NOISE: Final = (
+    UNUSED_COLUMN,
+    JOINTS_MOVED,
+    LINKS_GREW,
+    SETUP_TURNING,
+    STATED_TOO_LARGE,
+    *STEP_KINDS,
+)
 """Kinds of notices of what a model takes for noise, so that what it leaves is more than noise."""
 JOINTS: Final = "joints"
 LINKS: Final = "links"

@@ -43,12 +43,10 @@ AT_THE_FLOOR: Final = 1.25
 LENGTHS_SPREAD: Final = 0.42
 """Standard deviation of the length of a vector with three equal normal coordinates, over its mean."""
 SURE: Final = 3.0
-FEW_FOR_NOISE: Final = 5.0 / 3.0
-"""Training poses for each unknown, below which noise may be told a third or half of what it is: 60 of an arm
-of six joints in one set-up, 82 of seven. Orientations beside positions hardly help.
+LEFT_IN_TRAINING: Final = 0.3
+"""Share of the noise, squared, that a fit leaves in its own rows, below which noise may be told a quarter of
+what it is: what varies has followed most of it.
 """
-OF_A_SETUP: Final = 9
-"""Unknowns of a further set-up: its frame and its point."""
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
@@ -184,8 +182,6 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     if not leaves_noise(facts.best) or facts.leaves_more_than_noise:
         return
-    if facts.changed_meanwhile or any(_stated_sigma(facts)):
-        return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
@@ -200,7 +196,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     trained = facts.calibration.validation.poses_trained
     unsure = (
         ", though so few poses hardly tell noise from what the model misses"
-        if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE * _unknowns(facts)
+        if (facts.train_mean_mm / floor) ** 2 < LEFT_IN_TRAINING
         else ""
     )
     words = (
@@ -208,11 +204,6 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         f"than noise is what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
-
-
-def _unknowns(facts: Facts) -> int:
-    """How many numbers poses have to tell from noise, about: errors of each joint vary with each."""
-    return len(facts.joints) ** 2 + OF_A_SETUP * (len(facts.calibration.groups) - 1)
 
 
 def _least_by_chance(facts: Facts) -> float:

@@ -97,7 +97,7 @@ class AlongJoints:
         if medians[worst] < STANDS_OUT * overall:
             return f"No stretch of the joint stands out: {compared}"
         if not self._differ[joint]:
-            return f"No stretch of the joint stands out of what chance makes of so few poses: {compared}"
+            return f"No stretch of the joint stands out beyond chance: {compared}"
         stretch = f"{fixed(edges[worst], 0)} and {fixed(edges[worst + 1], 0)} {self.units[joint]}"
         return f"Largest between {stretch}: the median there is {here} mm, that of all poses {everywhere} mm."
 

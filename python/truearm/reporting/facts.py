@@ -180,6 +180,11 @@ class Facts:
         return distance_at_floor_mm(self.calibration)
 
     @property
+    def train_mean_mm(self) -> float:
+        """Mean position error of the model that predicts, on the rows it was trained with, mm."""
+        return self.calibration.validation.train[self.best].position.mean
+
+    @property
     def leaves_outliers_out(self) -> bool:
         """Whether errors are told without outliers too: some judged poses are, and the others tell so."""
         return bool(self.outliers.means_mm) and not self.is_of_no_help
@@ -257,7 +262,7 @@ class Facts:
 
     @property
     def leaves_more_than_noise(self) -> bool:
-        """Whether the model took for noise what moved with a column, or meanwhile."""
+        """Whether the model took more than noise for noise: what moved meanwhile, or with a column."""
         return any(map(self.noticed, TAKEN_FOR_NOISE))
 
     @cached_property
