@@ -21,7 +21,7 @@ from truearm.doubts.turning_sense import check_turns
 from truearm.doubts.unexplained import unexplained
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
-from truearm.fits.core_set import anchor_names, distance_ends, select
+from truearm.fits.core_set import anchor_names, distance_count, distance_ends, select
 from truearm.fits.details import ConstantDetails, VariableDetails, left_m
 from truearm.fits.fitted_rows import FittedRows, sides
 from truearm.fits.fitting import (
@@ -201,6 +201,7 @@ def _validate(
         n_train_poses=pose_count(trained.data),
         n_holdout=len(judged),
         n_holdout_poses=pose_count(judged),
+        n_holdout_distances=distance_count(held) if task.selection.distances else None,
         n_planned=_planned(judged) if split.planned else 0,
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},
