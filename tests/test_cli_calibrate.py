@@ -27,6 +27,7 @@ SUMMARY = [
     "n_train_poses",
     "n_holdout",
     "n_holdout_poses",
+    "n_holdout_distances",
     "holdout",
     "train",
     "coverage_95",

@@ -50,6 +50,26 @@ def test_a_calibration_from_pairs_comes_back(from_pairs, tmp_path):
         assert again.to_bytes() == from_pairs.to_bytes()
 
 
+def test_distances_of_pairs_are_counted_and_those_of_files_that_do_not_say_are_counted_by_rows(
+    from_pairs, tmp_path
+):
+    path, judged = tmp_path / "arm.calib", from_pairs.validation
+    assert (judged.n_holdout_distances, judged.poses_judged) == (26, "26 held-out distances")
+    assert "held-out distances" in repr(judged)
+    assert judged.n_holdout_poses == 2 * 26
+    assert judged.few == "The errors above come from 26 held-out distances: another split would give others."
+    for calibration, told in (
+        (from_pairs, "26 held-out distances"),
+        (from_pairs.without_rows(), "52 held-out poses"),
+    ):
+        calibration.save(path)
+        arrays, content = read_calibration_file(path)
+        del content["validation"]["n_holdout_distances"]
+        content["sha256"] = NO_DIGEST
+        write_calibration_file(path, arrays, content)
+        assert ta.Calibration.load(path).validation.poses_judged.startswith(told)
+
+
 def test_a_file_with_a_distance_of_a_point_for_each_pair_is_read(from_pairs, tmp_path):
     path = tmp_path / "arm.calib"
     from_pairs.save(path)

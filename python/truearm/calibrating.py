@@ -21,7 +21,7 @@ from truearm.doubts.turning_sense import check_turns
 from truearm.doubts.unexplained import unexplained
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
-from truearm.fits.core_set import distance_ends, select
+from truearm.fits.core_set import anchor_names, distance_count, distance_ends, select
 from truearm.fits.details import ConstantDetails, VariableDetails, left_m
 from truearm.fits.fitted_rows import FittedRows, sides
 from truearm.fits.fitting import (
@@ -160,7 +160,8 @@ def _task(
         )
     _check_features(data, options.features)
     arm = IdentifiedArm(robot, options.frame, options.parallel_within_deg)
-    return Task(arm, selection, data.groups, options, threads, stages)
+    anchors = anchor_names(data) if selection.distances else []
+    return Task(arm, selection, data.groups, options, threads, stages, anchors=anchors)
 
 
 def _check_train_on(options: CalibrationOptions) -> None:
@@ -200,6 +201,7 @@ def _validate(
         n_train_poses=pose_count(trained.data),
         n_holdout=len(judged),
         n_holdout_poses=pose_count(judged),
+        n_holdout_distances=distance_count(held) if task.selection.distances else None,
         n_planned=_planned(judged) if split.planned else 0,
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},

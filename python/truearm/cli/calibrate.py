@@ -278,12 +278,8 @@ def print_results(calibration: "Calibration") -> None:
 
 def _judged_in_words(calibration: "Calibration") -> str:
     """How many were judged: rows, or poses where those are fewer, or distances, of which a pair has one."""
-    from truearm.storage.summary import judged_distances
-
     validation = calibration.validation
-    if distances := judged_distances(calibration):
-        return distances
-    if validation.n_holdout_poses < validation.n_holdout:
+    if validation.n_holdout_distances is not None or validation.n_holdout_poses < validation.n_holdout:
         return validation.poses_judged
     return count_of(validation.n_holdout, "held-out row")
 

@@ -7,13 +7,14 @@ import numpy as np
 
 from truearm._core import Setup
 from truearm.description.one_turn import one_turn
-from truearm.errors import WorkError, list_names, rows_in_words
+from truearm.errors import WorkError, count_of, list_names, rows_in_words
 from truearm.fits.core_set import core_set, distances_apart
 from truearm.fits.identifiability import identify
 from truearm.fits.measured_parts import held_parts
 from truearm.measurements import Measurements
 from truearm.rows.splitting import rows_needed, share_needed
 from truearm.rows.visits import pose_count, pose_numbers
+from truearm.types import AXES
 
 if TYPE_CHECKING:
     from truearm.fits.fitting import Task
@@ -74,11 +75,14 @@ def _way_out_of_few(task: "Task", needed: int) -> str:
 
 
 def check_set_ups(task: "Task", data: Measurements) -> None:
-    """Refuse a set-up whose rows cannot find its own frame and target."""
+    """Refuse a set-up whose rows cannot find its own frame and target, and a fixed point that none find."""
+    if task.selection.distances:
+        _check_anchors(task, data)
+        return
     for group in task.groups:
         rows = data.select(data.group == group)
         values, unknowns = measured_values(task, rows), group_unknowns(task, rows)
-        if task.selection.distances or values > unknowns:
+        if values > unknowns:
             continue
         raise WorkError(
             f"{values} measured values in {rows_in_words(len(rows), pose_count(rows), 'training ')} cannot "
@@ -87,6 +91,22 @@ def check_set_ups(task: "Task", data: Measurements) -> None:
             rule="In each set-up there must be more measured values than unknowns",
             way_out=f"Measure more poses there{_or_hold_out_fewer(task)}. If device and target stood where "
             'they did in another set-up, give the rows of both the same name in a column "group"',
+        )
+
+
+def _check_anchors(task: "Task", data: Measurements) -> None:
+    """Refuse a fixed point that no more distances of training rows lead to than it has unknowns."""
+    for anchor in task.anchors:
+        rows = data.select(np.flatnonzero(data.anchor == anchor))
+        if (values := measured_values(task, rows)) > AXES:
+            continue
+        raise WorkError(
+            f"{count_of(values, 'distance')} in the training rows cannot determine the {AXES} unknowns of "
+            f"the fixed point {list_names([anchor])}",
+            where=", ".join(data.files),
+            rule="Of each fixed point there must be more distances, of different poses, than it has unknowns",
+            way_out=f"Measure more poses to it{_or_hold_out_fewer(task)}, or leave its rows out. If it is "
+            'one of the other fixed points, give both the same name in the column "anchor"',
         )
 
 

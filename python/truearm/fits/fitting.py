@@ -101,6 +101,7 @@ class Task:
         sizes: Poses of each file that a share is held out of; empty where none is.
         starts: Fits of nearly the same rows: the search for constants begins there too, with their noise.
             With more the prior would draw constants away that are far from nominal.
+        anchors: Names of the fixed points that distances lead to, in the order of their numbers.
     """
 
     arm: IdentifiedArm
@@ -111,6 +112,7 @@ class Task:
     stages: Stages = no_stages
     sizes: tuple[int, ...] = ()
     starts: tuple[ConstantFit, ...] = ()
+    anchors: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         """Check what the core takes as it is."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm._core import Setup
 from truearm.errors import InputError, Notice, count_of, list_names
-from truearm.fits.core_set import Selection
+from truearm.fits.core_set import Selection, anchor_names
 from truearm.fits.fitting import Task, feature_values
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.measured_parts import held_parts
@@ -160,9 +160,17 @@ def judge(
             at = model.parameters(model_inputs(task.arm, fitted, features))
             setup = setup_of_judged(task, fitted, at, model.setup)
             selection = Selection((selection.judge,), selection.orientation, judge=selection.judge)
+        if selection.distances:
+            setup = _with_anchors_of(data, task, setup)
         parameters = model.parameters(model_inputs(task.arm, data, features))
         found[name] = row_errors(task.arm, data, selection, task.groups, parameters, setup)
     return found
+
+
+def _with_anchors_of(data: Measurements, task: Task, setup: Setup) -> Setup:
+    """The set-up with the fixed points that distances of `data` lead to: rows number those that they name."""
+    numbers = np.array([task.anchors.index(name) for name in anchor_names(data)], dtype=np.int64)
+    return Setup(setup.frames, setup.targets, setup.rotations, setup.anchors[numbers])
 
 
 def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: Setup) -> Setup:

@@ -170,6 +170,8 @@ class Validation:
             were held out of one fit.
         n_planned: How many of them were held out because they were planned to validate.
         drift: What was taken out of all measurements, those that were held out too; None where nothing was.
+        n_holdout_distances: How many distances were judged, of which a pair of rows has one; None where
+            points were, and of files of earlier versions without their rows.
     """
 
     n_train: int
@@ -182,6 +184,7 @@ class Validation:
     left_out: bool = False
     n_planned: int = 0
     drift: DriftDetails | None = None
+    n_holdout_distances: int | None = None
 
     def __post_init__(self) -> None:
         hold_read_only(self, "holdout", "train")
@@ -207,13 +210,21 @@ class Validation:
 
     @property
     def poses_judged(self) -> str:
-        """How many were judged: "832 held-out poses", or "70 held-out poses (210 rows)"."""
-        return _poses(self.judged, self.n_holdout_poses, self.n_holdout)
+        """How many were judged: "832 held-out poses", "70 held-out poses (210 rows)", and of distances "36
+        held-out distances", "27 held-out distances at 9 poses".
+        """
+        distances, poses = self.n_holdout_distances, self.n_holdout_poses
+        if distances is None:
+            return _poses(self.judged, poses, self.n_holdout)
+        several = f" at {count_of(poses, 'pose')}" if poses < distances else ""
+        return count_of(distances, f"{self.judged} distance") + several
 
     @property
     def few(self) -> str:
         """What is said where so few were judged that others would give other errors; empty elsewhere."""
-        if self.n_holdout_poses >= FEW_HELD:
+        distances = self.n_holdout_distances
+        apart = self.n_holdout_poses if distances is None else min(distances, self.n_holdout_poses)
+        if apart >= FEW_HELD:
             return ""
         if self.left_out:
             poses = count_of(self.n_holdout_poses, "pose")
@@ -227,6 +238,7 @@ class Validation:
             "n_train_poses": self.n_train_poses,
             "n_holdout": self.n_holdout,
             "n_holdout_poses": self.n_holdout_poses,
+            "n_holdout_distances": self.n_holdout_distances,
             "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
             "train": {name: errors.to_dict() for name, errors in self.train.items()},
             "coverage_95": self.coverage_95,
@@ -253,6 +265,7 @@ class Validation:
             left_out=content.get("left_out", False),
             n_planned=content.get("n_planned", 0),
             drift=DriftDetails.from_dict(content["drift"]) if content.get("drift") else None,
+            n_holdout_distances=content.get("n_holdout_distances"),
         )
 
 

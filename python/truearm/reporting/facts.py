@@ -22,7 +22,7 @@ from truearm.fits.stillness import still_warning
 from truearm.judgement.held_rows import HeldRows
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.reporting.waypoints import Waypoints
-from truearm.storage.summary import WAVE, distance_at_floor_mm, judged_distances
+from truearm.storage.summary import WAVE, distance_at_floor_mm
 from truearm.types import Floats
 from truearm.units import MM_PER_METRE
 
@@ -72,7 +72,7 @@ class Facts:
     @property
     def poses_judged(self) -> str:
         """How many they are: "832 held-out poses", or "36 held-out distances"."""
-        return judged_distances(self.calibration) or self.calibration.validation.poses_judged
+        return self.calibration.validation.poses_judged
 
     @property
     def those_judged(self) -> str:

@@ -22,7 +22,7 @@ from truearm.fits.identifiability import Identifiability
 from truearm.fits.identified import IdentifiedArm
 from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import MeasuredParts
-from truearm.fits.models import ArmModel
+from truearm.fits.models import NOMINAL, ArmModel
 from truearm.fits.options import CalibrationOptions
 from truearm.fits.scheme_fitting import SchemeDetails
 from truearm.judgement.held_rows import HeldRows
@@ -113,6 +113,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     constant, held = content["constant"], content.get("held")
     bounds = content.get("conservative")
     check_arrays(arrays, content, arm.table.shape, robot.joint_count)
+    judged = None if held is None else HeldRows.unpack(held, arrays)
     inputs = robot.joint_count + len(options.features)
     models = {
         name: _read_model(name, stored, arrays, (inputs, arm)) for name, stored in content["models"].items()
@@ -139,9 +140,9 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "constant": details,
         "variable": _read_variable(content["variable"]),
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
-        "validation": Validation.from_dict(content["validation"]),
+        "validation": _read_validation(content["validation"], selection, judged),
         "rows": rows,
-        "held": None if held is None else HeldRows.unpack(held, arrays),
+        "held": judged,
         "data_hash": content["data_sha256"],
         "version": content["version"],
         "notices": tuple(_notice(stored) for stored in content.get("notices", ())),
@@ -150,6 +151,14 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         else conservative.unpack(bounds, arrays, robot.flange_chain),
         "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
+
+
+def _read_validation(content: Mapping[str, Any], selection: Selection, held: HeldRows | None) -> Validation:
+    """The validation; files of earlier versions count their distances by their rows alone."""
+    found = Validation.from_dict(content)
+    if not selection.distances or held is None or found.n_holdout_distances is not None:
+        return found
+    return replace(found, n_holdout_distances=int(held.errors[NOMINAL].measured.sum()))
 
 
 def _read_rows(content: Mapping[str, Any], arrays: Arrays, selection: Selection) -> FittedRows | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from truearm._core import ANGLE_ARM_M
-from truearm.errors import count_of, in_json
+from truearm.errors import in_json
 from truearm.fits.details import left_m
 from truearm.judgement.validation import mean_distance
 from truearm.types import AXES, Floats
@@ -93,15 +93,6 @@ def whole_noise_mm(calibration: "Calibration") -> float:
 def distance_at_floor_mm(calibration: "Calibration") -> float:
     """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
     return mean_distance(whole_noise_mm(calibration), distances=calibration.selection.distances)
-
-
-def judged_distances(calibration: "Calibration") -> str:
-    """How many distances were judged, in words; empty where points were measured, or rows are not known."""
-    held, validation = calibration.held, calibration.validation
-    if not calibration.selection.distances or held is None:
-        return ""
-    judged = int(held.errors[calibration.model_name].measured.sum())
-    return count_of(judged, f"{validation.judged} distance")
 
 
 def saw_orientations(calibration: "Calibration") -> bool:
