@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from tests.report_support import words_of
-from truearm import Calibration, CalibrationOptions, Robot, UsageError, WorkError, calibrate, evaluate
+from truearm import (
+    Calibration,
+    CalibrationOptions,
+    Measurements,
+    Robot,
+    UsageError,
+    WorkError,
+    calibrate,
+    evaluate,
+)
 from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
@@ -91,6 +100,37 @@ def test_outliers_of_a_scheme_are_those_of_its_constants(data, arm, shots):
     far = rows.score > 1.0
     np.testing.assert_array_equal(rows.distance_m[far], theirs.distance_m[far])
     np.testing.assert_allclose(rows.distance_m[~far], missed_m(found)[~far], rtol=0.0, atol=1e-12)
+
+
+def test_the_scale_of_a_robust_loss_is_that_of_the_constants(arm, data):
+    few = data.select(slice(0, 150))
+    found, constant = (
+        calibrate(arm.robot, few, model=model, robust="huber", **QUICK) for model in ("regions", "constant")
+    )
+    clear = constant.rows.score <= 1.0
+    left = constant.rows.residual[clear] / constant.constant.noise_m
+    freedom = left.size - constant.identifiability.total_rank
+    assert constant.constant.scale.widened == pytest.approx(np.sqrt((left**2).sum() / freedom), rel=1e-12)
+    assert found.constant.scale == constant.constant.scale
+
+
+def test_outliers_of_a_scheme_are_turned_as_far_as_they_are_away():
+    """Both by the constants: a scheme follows rows that it was fitted to."""
+    arm = VirtualArm(Robot.load("ur10"), seed=4, imperfections=WAVY)
+    table = arm.measure_table(arm.poses(150), orientation=True)
+    table.loc[[7, 60], "y"] += 0.02
+    spoilt = Measurements.from_dataframe(table)
+    found, constant = (
+        calibrate(arm.robot, spoilt, model=model, most_regions=8) for model in ("regions", "constant")
+    )
+    assert [entry["row"] for entry in found.rows.outliers()] == [61, 8]
+    assert found.rows.outliers() == constant.rows.outliers()
+    again = Calibration.from_bytes(found.to_bytes(), where="again")
+    assert again.rows.outliers() == found.rows.outliers()
+    clear = found.rows.score <= 1.0
+    own = np.linalg.norm(found.rows.residual[clear, 3:], axis=1)
+    np.testing.assert_array_equal(found.rows.turn_rad[clear], own)
+    assert found.rows.turn_rad[clear].mean() != pytest.approx(constant.rows.turn_rad[clear].mean(), rel=0.01)
 
 
 def test_predictions_are_those_of_the_scheme(calibrations, arm):
