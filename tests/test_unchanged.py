@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.planning import InBox, JointSpace, KeepOut
+from truearm.planning import InBox, InCone, InSphere, JointSpace, KeepOut, LeastContactAngle
 from truearm.proposing import Candidates
 from truearm.simulation import VirtualArm
 
@@ -70,6 +70,17 @@ def test_candidates_spaces_and_rules_keep_their_numbers(robot, calibration):
     np.testing.assert_array_equal(space.readings(np.zeros((1, 3)))[0][0, 3:], 0.2)
     np.testing.assert_array_equal([space.low, box.low, kept.low], 0.0)
     np.testing.assert_array_equal([space.high, box.high, kept.high], 1.0)
+
+
+def test_rules_hold_arrays_that_cannot_be_changed():
+    box: Any = InBox((0.0, 0.0, 0.1), np.ones(3))
+    np.testing.assert_allclose(box.high - box.low, [1.0, 1.0, 0.9])
+    sees: Any = InCone([1.0, 0.0, 0.5], (-1, 0, 0), 0.3)
+    np.testing.assert_allclose(sees.apex + 2.0 * sees.axis, [-1.0, 0.0, 0.5])
+    for held in (box.low, box.high, InSphere((1, 2, 3), 0.1).centre, sees.apex, sees.axis):
+        with pytest.raises(ValueError, match="read-only"):
+            held[2] = 0.5
+    assert len({box, sees, KeepOut(box.low, box.high), LeastContactAngle((0.0, 0.0, 1.0))}) == 4
 
 
 def views_of(numbers):
