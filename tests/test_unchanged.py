@@ -12,6 +12,7 @@ import pytest
 import truearm as ta
 from truearm.planning import InBox, InCone, InSphere, JointSpace, KeepOut, LeastContactAngle
 from truearm.proposing import Candidates
+from truearm.rows.splitting import split_columns
 from truearm.simulation import VirtualArm
 
 
@@ -124,6 +125,26 @@ def test_features_are_handed_out_as_copies(data):
     assert pickle.loads(pickle.dumps(made)).hash() == copy.deepcopy(made).hash() == before
 
 
+def test_features_of_the_class_are_no_table():
+    kind: Any = ta.Measurements
+    assert not isinstance(kind.features, pd.DataFrame)
+
+
+def test_features_are_copied_once_for_all_columns(data, monkeypatch):
+    made = replace(data, features=pd.DataFrame(np.ones((len(data), 30))).add_prefix("f"))
+    copies, copy_of = list[bool](), pd.DataFrame.copy
+
+    def counted(table, deep=True):
+        copies.append(deep)
+        return copy_of(table, deep)
+
+    monkeypatch.setattr(pd.DataFrame, "copy", counted)
+    for ask in (made.hash, made.content, lambda: split_columns(made)):
+        copies.clear()
+        ask()
+        assert len(copies) == 1
+
+
 def test_own_rows_are_kept_without_copies(data):
     assert np.shares_memory(replace(data, readings=data.readings[:]).readings, data.readings)
 
@@ -165,10 +186,15 @@ class OwnCalibration(ta.Calibration):
     """A user's own kind of calibration."""
 
 
+class OwnCompensator(ta.Compensator):
+    """A user's own kind of compensator."""
+
+
 def test_own_kinds_are_sent_and_copied_as_what_they_are(data, calibration, tmp_path):
     calibration.save(tmp_path / "arm.calib")
     own = OwnCalibration.load(tmp_path / "arm.calib")
-    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own):
+    compensator = OwnCompensator(own, task="position")
+    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own, compensator):
         for again in (copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))):
             assert type(again(thing)) is type(thing)
     assert copy.deepcopy(own).to_bytes() == calibration.to_bytes()

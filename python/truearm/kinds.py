@@ -198,8 +198,11 @@ def name(value: object, argument: str) -> str:
     Raises:
         UsageError: If it is anything else.
     """
-    is_number = isinstance(value, Integral) and not isinstance(value, bool)
-    return str(value) if is_number else text(value, argument)
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        return str(value)
+    raise UsageError(f"{argument} is {value!r}", rule="It must be a name, a text or a whole number")
 
 
 def content_bytes(content: object, noun: str) -> bytes:
