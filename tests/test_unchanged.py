@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.planning import InBox, InCone, InSphere, JointSpace, KeepOut, LeastContactAngle
+from truearm.planning import CartesianSpace, InBox, InCone, InSphere, JointSpace, KeepOut, LeastContactAngle
 from truearm.proposing import Candidates
 from truearm.rows.splitting import split_columns
 from truearm.simulation import VirtualArm
@@ -172,6 +172,32 @@ def test_the_errors_of_a_virtual_arm_are_as_drawn(robot):
         arm.errors[2, 2] += 0.01
     with pytest.raises(AttributeError, match="errors"):
         cast("Any", arm).errors = np.zeros((6, 5))
+
+
+def sent(value):
+    return pickle.loads(pickle.dumps(value))
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, sent])
+def test_what_cannot_be_changed_cannot_be_after_a_copy_either(again, robot, data, calibration):
+    evaluated = ta.evaluate(calibration, data)
+    held: list[tuple[Any, str]] = [
+        (calibration.rows, "residual"),
+        (calibration.held, "readings"),
+        (calibration.held.errors["constant"], "position"),
+        (calibration.constant, "covariance"),
+        (calibration.measured, "targets"),
+        (Candidates(calibration, data.readings), "readings"),
+        (VirtualArm(robot, seed=1), "errors"),
+        (JointSpace(robot, np.zeros(3), np.ones(3)), "low"),
+        (CartesianSpace(robot, np.zeros(3), np.ones(3)), "origin"),
+        (InBox(np.zeros(3), np.ones(3)), "high"),
+    ]
+    for thing, name in held:
+        array, same = getattr(again(thing), name), getattr(thing, name)
+        np.testing.assert_array_equal(array, same)
+        assert not array.flags.writeable, (thing, name)
+    assert not again(evaluated).rows.errors["constant"].position.flags.writeable
 
 
 class OwnRobot(ta.Robot):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, residuals
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection, core_set, distance_ends
 from truearm.fits.fitting import Fits, Task, constant_variances
@@ -30,7 +30,7 @@ ODDS_OF_CHANCE: Final = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class FittedRows:
+class FittedRows(HoldsReadOnly):
     """n rows in the order they were fitted in.
 
     `truearm.calibrate` makes one, `calibration.rows`.

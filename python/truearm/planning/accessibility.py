@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.arrays import as_numbers, as_rows, read_only
+from truearm.arrays import HoldsReadOnly, as_numbers, as_rows, read_only
 from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, UsageError, count_of
 from truearm.fits.endpoints import at_tool
@@ -145,7 +145,7 @@ class JointLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class InBox:
+class InBox(HoldsReadOnly):
     """The tool point lies in a box in the base frame, from `low` to `high` (3,), m."""
 
     low: ArrayLike
@@ -162,7 +162,7 @@ class InBox:
 
 
 @dataclass(frozen=True, eq=False)
-class InSphere:
+class InSphere(HoldsReadOnly):
     """The tool point is between `least_m` and `radius_m` away from `centre` (3,) in the base frame."""
 
     centre: ArrayLike
@@ -181,7 +181,7 @@ class InSphere:
 
 
 @dataclass(frozen=True, eq=False)
-class InCone:
+class InCone(HoldsReadOnly):
     """A device at `apex` sees the tool point, within `half_angle_rad` of the `axis` that it looks along.
 
     Attributes:
@@ -209,7 +209,7 @@ class InCone:
 
 
 @dataclass(frozen=True, eq=False)
-class LeastContactAngle:
+class LeastContactAngle(HoldsReadOnly):
     """The pin meets the touch panel at no less than an angle, 15 deg in section 7 of the paper.
 
     Attributes:
@@ -235,7 +235,7 @@ class LeastContactAngle:
 
 
 @dataclass(frozen=True, eq=False)
-class KeepOut:
+class KeepOut(HoldsReadOnly):
     """No part of the arm is in a box in the base frame, from `low` to `high` (3,), m.
 
     The arm is taken as straight lines between the frames of its links, from the base's to the tool: the box,
