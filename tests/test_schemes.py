@@ -22,7 +22,10 @@ from truearm import (
 from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
+from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.known_scale import KnownScale
 from truearm.fits.scheme_options import SchemeOptions
+from truearm.kinds import required
 from truearm.simulation import Imperfections, VirtualArm
 
 QUICK: dict[str, Any] = {"most_regions": 12, "region_rows": 12, "holdout": 0.3, "cells": (9, 7, 7)}
@@ -107,11 +110,13 @@ def test_the_scale_of_a_robust_loss_is_that_of_the_constants(arm, data):
     found, constant = (
         calibrate(arm.robot, few, model=model, robust="huber", **QUICK) for model in ("regions", "constant")
     )
-    clear = constant.rows.score <= 1.0
-    left = constant.rows.residual[clear] / constant.constant.noise_m
+    rows = required(constant.rows, FittedRows, "rows")
+    scale = required(constant.constant.scale, KnownScale, "scale")
+    clear = rows.score <= 1.0
+    left = rows.residual[clear] / constant.constant.noise_m
     freedom = left.size - constant.identifiability.total_rank
-    assert constant.constant.scale.widened == pytest.approx(np.sqrt((left**2).sum() / freedom), rel=1e-12)
-    assert found.constant.scale == constant.constant.scale
+    assert scale.widened == pytest.approx(np.sqrt((left**2).sum() / freedom), rel=1e-12)
+    assert found.constant.scale == scale
 
 
 def test_outliers_of_a_scheme_are_turned_as_far_as_they_are_away():
@@ -123,14 +128,14 @@ def test_outliers_of_a_scheme_are_turned_as_far_as_they_are_away():
     found, constant = (
         calibrate(arm.robot, spoilt, model=model, most_regions=8) for model in ("regions", "constant")
     )
-    assert [entry["row"] for entry in found.rows.outliers()] == [61, 8]
-    assert found.rows.outliers() == constant.rows.outliers()
     again = Calibration.from_bytes(found.to_bytes(), where="again")
-    assert again.rows.outliers() == found.rows.outliers()
-    clear = found.rows.score <= 1.0
-    own = np.linalg.norm(found.rows.residual[clear, 3:], axis=1)
-    np.testing.assert_array_equal(found.rows.turn_rad[clear], own)
-    assert found.rows.turn_rad[clear].mean() != pytest.approx(constant.rows.turn_rad[clear].mean(), rel=0.01)
+    rows, theirs, read = (required(each.rows, FittedRows, "rows") for each in (found, constant, again))
+    assert [entry["row"] for entry in rows.outliers()] == [61, 8]
+    assert rows.outliers() == theirs.outliers() == read.outliers()
+    clear = rows.score <= 1.0
+    own = np.linalg.norm(rows.residual[clear, 3:], axis=1)
+    np.testing.assert_array_equal(rows.turn_rad[clear], own)
+    assert rows.turn_rad[clear].mean() != pytest.approx(theirs.turn_rad[clear].mean(), rel=0.01)
 
 
 def test_predictions_are_those_of_the_scheme(calibrations, arm):

@@ -78,7 +78,8 @@ def test_rules_hold_arrays_that_cannot_be_changed():
     np.testing.assert_allclose(box.high - box.low, [1.0, 1.0, 0.9])
     sees: Any = InCone([1.0, 0.0, 0.5], (-1, 0, 0), 0.3)
     np.testing.assert_allclose(sees.apex + 2.0 * sees.axis, [-1.0, 0.0, 0.5])
-    for held in (box.low, box.high, InSphere((1, 2, 3), 0.1).centre, sees.apex, sees.axis):
+    ball: Any = InSphere((1, 2, 3), 0.1)
+    for held in (box.low, box.high, ball.centre, sees.apex, sees.axis):
         with pytest.raises(ValueError, match="read-only"):
             held[2] = 0.5
     assert len({box, sees, KeepOut(box.low, box.high), LeastContactAngle((0.0, 0.0, 1.0))}) == 4

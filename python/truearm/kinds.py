@@ -198,9 +198,8 @@ def name(value: object, argument: str) -> str:
     Raises:
         UsageError: If it is anything else.
     """
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, Integral) and not isinstance(value, bool):
+    is_number = isinstance(value, Integral) and not isinstance(value, bool)
+    if is_number or isinstance(value, str):
         return str(value)
     raise UsageError(f"{argument} is {value!r}", rule="It must be a name, a text or a whole number")
 
