@@ -9,11 +9,23 @@ import numpy as np
 import pytest
 
 from tests.report_support import words_of
-from truearm import Calibration, CalibrationOptions, Robot, UsageError, WorkError, calibrate, evaluate
+from truearm import (
+    Calibration,
+    CalibrationOptions,
+    Measurements,
+    Robot,
+    UsageError,
+    WorkError,
+    calibrate,
+    evaluate,
+)
 from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
+from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.known_scale import KnownScale
 from truearm.fits.scheme_options import SchemeOptions
+from truearm.kinds import required
 from truearm.simulation import Imperfections, VirtualArm
 
 QUICK: dict[str, Any] = {"most_regions": 12, "region_rows": 12, "holdout": 0.3, "cells": (9, 7, 7)}
@@ -91,6 +103,39 @@ def test_outliers_of_a_scheme_are_those_of_its_constants(data, arm, shots):
     far = rows.score > 1.0
     np.testing.assert_array_equal(rows.distance_m[far], theirs.distance_m[far])
     np.testing.assert_allclose(rows.distance_m[~far], missed_m(found)[~far], rtol=0.0, atol=1e-12)
+
+
+def test_the_scale_of_a_robust_loss_is_that_of_the_constants(arm, data):
+    few = data.select(slice(0, 150))
+    found, constant = (
+        calibrate(arm.robot, few, model=model, robust="huber", **QUICK) for model in ("regions", "constant")
+    )
+    rows = required(constant.rows, FittedRows, "rows")
+    scale = required(constant.constant.scale, KnownScale, "scale")
+    clear = rows.score <= 1.0
+    left = rows.residual[clear] / constant.constant.noise_m
+    freedom = left.size - constant.identifiability.total_rank
+    assert scale.widened == pytest.approx(np.sqrt((left**2).sum() / freedom), rel=1e-12)
+    assert found.constant.scale == scale
+
+
+def test_outliers_of_a_scheme_are_turned_as_far_as_they_are_away():
+    """Both by the constants: a scheme follows rows that it was fitted to."""
+    arm = VirtualArm(Robot.load("ur10"), seed=4, imperfections=WAVY)
+    table = arm.measure_table(arm.poses(150), orientation=True)
+    table.loc[[7, 60], "y"] += 0.02
+    spoilt = Measurements.from_dataframe(table)
+    found, constant = (
+        calibrate(arm.robot, spoilt, model=model, most_regions=8) for model in ("regions", "constant")
+    )
+    again = Calibration.from_bytes(found.to_bytes(), where="again")
+    rows, theirs, read = (required(each.rows, FittedRows, "rows") for each in (found, constant, again))
+    assert [entry["row"] for entry in rows.outliers()] == [61, 8]
+    assert rows.outliers() == theirs.outliers() == read.outliers()
+    clear = rows.score <= 1.0
+    own = np.linalg.norm(rows.residual[clear, 3:], axis=1)
+    np.testing.assert_array_equal(rows.turn_rad[clear], own)
+    assert rows.turn_rad[clear].mean() != pytest.approx(theirs.turn_rad[clear].mean(), rel=0.01)
 
 
 def test_predictions_are_those_of_the_scheme(calibrations, arm):

@@ -141,5 +141,5 @@ def test_a_set_up_with_a_number_for_its_name_may_be_asked_for_by_it(arm):
     for ask in (lambda: found.position(q, group=2), lambda: Candidates(found, q, group=2)):
         with pytest.raises(ta.UsageError, match='there is no set-up "2". The calibration knows "1"'):
             ask()
-    with pytest.raises(ta.UsageError, match=r"group is 1.5. It must be a text"):
+    with pytest.raises(ta.UsageError, match=r"group is 1.5. It must be a name, a text or a whole number"):
         found.position(q, group=cast("Any", 1.5))

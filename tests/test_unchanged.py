@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.planning import InBox, JointSpace, KeepOut
+from truearm.planning import CartesianSpace, InBox, InCone, InSphere, JointSpace, KeepOut, LeastContactAngle
 from truearm.proposing import Candidates
+from truearm.rows.splitting import split_columns
 from truearm.simulation import VirtualArm
 
 
@@ -72,6 +73,18 @@ def test_candidates_spaces_and_rules_keep_their_numbers(robot, calibration):
     np.testing.assert_array_equal([space.high, box.high, kept.high], 1.0)
 
 
+def test_rules_hold_arrays_that_cannot_be_changed():
+    box: Any = InBox((0.0, 0.0, 0.1), np.ones(3))
+    np.testing.assert_allclose(box.high - box.low, [1.0, 1.0, 0.9])
+    sees: Any = InCone([1.0, 0.0, 0.5], (-1, 0, 0), 0.3)
+    np.testing.assert_allclose(sees.apex + 2.0 * sees.axis, [-1.0, 0.0, 0.5])
+    ball: Any = InSphere((1, 2, 3), 0.1)
+    for held in (box.low, box.high, ball.centre, sees.apex, sees.axis):
+        with pytest.raises(ValueError, match="read-only"):
+            held[2] = 0.5
+    assert len({box, sees, KeepOut(box.low, box.high), LeastContactAngle((0.0, 0.0, 1.0))}) == 4
+
+
 def views_of(numbers):
     """A read-only view of an array that is its owner's to change, and the array."""
     owned = np.array(numbers)
@@ -113,6 +126,26 @@ def test_features_are_handed_out_as_copies(data):
     assert pickle.loads(pickle.dumps(made)).hash() == copy.deepcopy(made).hash() == before
 
 
+def test_features_of_the_class_are_no_table():
+    kind: Any = ta.Measurements
+    assert not isinstance(kind.features, pd.DataFrame)
+
+
+def test_features_are_copied_once_for_all_columns(data, monkeypatch):
+    made = replace(data, features=pd.DataFrame(np.ones((len(data), 30))).add_prefix("f"))
+    copies, copy_of = list[bool](), pd.DataFrame.copy
+
+    def counted(table, deep=True):
+        copies.append(deep)
+        return copy_of(table, deep)
+
+    monkeypatch.setattr(pd.DataFrame, "copy", counted)
+    for ask in (made.hash, made.content, lambda: split_columns(made)):
+        copies.clear()
+        ask()
+        assert len(copies) == 1
+
+
 def test_own_rows_are_kept_without_copies(data):
     assert np.shares_memory(replace(data, readings=data.readings[:]).readings, data.readings)
 
@@ -142,6 +175,32 @@ def test_the_errors_of_a_virtual_arm_are_as_drawn(robot):
         cast("Any", arm).errors = np.zeros((6, 5))
 
 
+def sent(value):
+    return pickle.loads(pickle.dumps(value))
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, sent])
+def test_what_cannot_be_changed_cannot_be_after_a_copy_either(again, robot, data, calibration):
+    evaluated = ta.evaluate(calibration, data)
+    held: list[tuple[Any, str]] = [
+        (calibration.rows, "residual"),
+        (calibration.held, "readings"),
+        (calibration.held.errors["constant"], "position"),
+        (calibration.constant, "covariance"),
+        (calibration.measured, "targets"),
+        (Candidates(calibration, data.readings), "readings"),
+        (VirtualArm(robot, seed=1), "errors"),
+        (JointSpace(robot, np.zeros(3), np.ones(3)), "low"),
+        (CartesianSpace(robot, np.zeros(3), np.ones(3)), "origin"),
+        (InBox(np.zeros(3), np.ones(3)), "high"),
+    ]
+    for thing, name in held:
+        array, same = getattr(again(thing), name), getattr(thing, name)
+        np.testing.assert_array_equal(array, same)
+        assert not array.flags.writeable, (thing, name)
+    assert not again(evaluated).rows.errors["constant"].position.flags.writeable
+
+
 class OwnRobot(ta.Robot):
     """A user's own kind of robot."""
 
@@ -154,10 +213,15 @@ class OwnCalibration(ta.Calibration):
     """A user's own kind of calibration."""
 
 
+class OwnCompensator(ta.Compensator):
+    """A user's own kind of compensator."""
+
+
 def test_own_kinds_are_sent_and_copied_as_what_they_are(data, calibration, tmp_path):
     calibration.save(tmp_path / "arm.calib")
     own = OwnCalibration.load(tmp_path / "arm.calib")
-    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own):
+    compensator = OwnCompensator(own, task="position")
+    for thing in (OwnRobot.load("ur10"), OwnMeasurements.concatenate([data]), own, compensator):
         for again in (copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))):
             assert type(again(thing)) is type(thing)
     assert copy.deepcopy(own).to_bytes() == calibration.to_bytes()

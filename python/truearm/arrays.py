@@ -168,6 +168,20 @@ def _is_fixed(values: NDArray[Any]) -> bool:
     return False
 
 
+class HoldsReadOnly:
+    """A frozen dataclass whose __post_init__ holds its arrays read-only.
+
+    NumPy gives what was pickled or deeply copied back writeable: then they are held so again.
+    """
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        raise NotImplementedError
+
+
 def hold_read_only(record: object, *names: str) -> None:
     """Make a frozen dataclass's arrays and dicts, those that are not None, its own and read-only.
 

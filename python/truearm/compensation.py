@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 from typing import Final
 
@@ -177,8 +177,15 @@ class Compensator:
         return f"<Compensator of {name} by the {model} model, {self.task}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        shared = (self.calibration, self.programming, self.task, self._moving, self.limits)
-        return _compensator, (*shared, self.named_features)
+        made = partial(
+            type(self),
+            programming=self.programming,
+            task=self.task,
+            moving=self._moving,
+            limits=self.limits,
+            features=self.named_features,
+        )
+        return made, (self.calibration,)
 
     def joints(
         self, q: ArrayLike, *, tool: ArrayLike | None = None, author: Robot | None = None
@@ -324,17 +331,3 @@ def _kinematics(arm: Robot) -> tuple[bytes | str, ...]:
     """What tells where an arm with given kinds of joints goes, for comparison with another's."""
     numbers = arm.base, arm.flange, arm.table, arm.coupling
     return arm.convention, *(part.tobytes() for part in numbers)
-
-
-def _compensator(
-    calibration: Calibration,
-    programming: Robot,
-    task: Task,
-    moving: Sequence[int] | Whole | None,
-    limits: Limits,
-    features: Mapping[str, float],
-) -> Compensator:
-    """A compensator that was pickled."""
-    return Compensator(
-        calibration, programming=programming, task=task, moving=moving, limits=limits, features=features
-    )

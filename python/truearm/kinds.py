@@ -199,7 +199,9 @@ def name(value: object, argument: str) -> str:
         UsageError: If it is anything else.
     """
     is_number = isinstance(value, Integral) and not isinstance(value, bool)
-    return str(value) if is_number else text(value, argument)
+    if is_number or isinstance(value, str):
+        return str(value)
+    raise UsageError(f"{argument} is {value!r}", rule="It must be a name, a text or a whole number")
 
 
 def content_bytes(content: object, noun: str) -> bytes:

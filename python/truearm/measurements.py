@@ -349,9 +349,9 @@ class Measurements:
             if value is not None:
                 is_text = value.dtype.kind == "U"
                 digest.update("\n".join(value).encode() if is_text else np.ascontiguousarray(value).tobytes())
-        for column in self.features.columns:
+        for column, values in self.features.items():
             digest.update(f"{column}:".encode())
-            digest.update(np.ascontiguousarray(self.features[column], dtype=np.float64).tobytes())
+            digest.update(np.ascontiguousarray(values, dtype=np.float64).tobytes())
         return digest.hexdigest()
 
     def seen(self, targets: int | Sequence[int] | None = None) -> NDArray[np.bool_]:
@@ -395,7 +395,7 @@ class Measurements:
             if value is not None:
                 flat = value.reshape(len(self), -1)
                 columns |= {f"{name}{k}": flat[:, k] for k in range(flat.shape[1])}
-        columns |= {f"feature {name}": self.features[name].to_numpy() for name in self.features.columns}
+        columns |= {f"feature {name}": values.to_numpy() for name, values in self.features.items()}
         return pd.DataFrame(columns)
 
 

@@ -6,7 +6,7 @@ from truearm._core import linearise, setup_jacobian
 from truearm.defaults import ROBUST
 from truearm.fits.core_set import core_set, distances_apart
 from truearm.fits.details import ConstantDetails
-from truearm.fits.fitted_rows import FittedRows
+from truearm.fits.fitted_rows import scores_of_constants
 from truearm.fits.fitting import Fits, Task, constant_variances
 from truearm.fits.known_scale import KnownScale, common_share
 from truearm.fits.measured_parts import held_parts
@@ -104,12 +104,15 @@ def standard_errors(task: Task, fits: Fits, covariance: Floats) -> Floats:
 
 
 def _widened(task: Task, fits: Fits) -> float:
-    """Root mean square of what a robust loss leaves of rows that are no outliers, in units of its noise."""
+    """Root mean square of what constants of a robust loss leave of rows that are no outliers, in units of its
+    noise.
+    """
     if fits.variable is not None or task.selection.distances or task.options.robust == ROBUST:
         return 1.0
-    rows = FittedRows.of(task, fits, np.zeros(len(fits.data), dtype=np.int64))
-    kept = rows.residual[rows.score <= 1.0]
-    squares = kept**2 / constant_variances(fits, task.selection)[rows.score <= 1.0]
+    residual = fits.constant.residuals.reshape(len(fits.data), -1)
+    clear = scores_of_constants(fits, residual, task.selection) <= 1.0
+    kept = residual[clear]
+    squares = kept**2 / constant_variances(fits, task.selection)[clear]
     freedom = max(int(np.count_nonzero(kept)) - fits.identifiability.total_rank, 1)
     return float(np.sqrt(squares.sum() / freedom)) or 1.0
 

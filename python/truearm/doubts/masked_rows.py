@@ -40,7 +40,8 @@ MOST_TESTED: Final = 20
 
 
 def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
-    """Rows with `score` and `distance_m` by constants that rows far off do not bend, where others are bent.
+    """Rows with `score`, `distance_m` and `turn_rad` by constants that rows far off do not bend, where others
+    are bent.
 
     Where rows are few for the unknowns a robust loss takes some for far off whatever they are. Such a one is
     an outlier if least squares without all others leave overwhelmingly less without it too.
@@ -61,9 +62,7 @@ def judged_unbent(task: Task, rows: FittedRows, fits: Fits) -> FittedRows:
     outliers = score > 1.0
     if not outliers.any():
         return rows
-    by_constants = outliers | (fits.scheme is None)
-    distance = np.where(by_constants, judged.distance_m, rows.distance_m)
-    return replace(rows, score=score, distance_m=distance)
+    return replace(rows, score=score).apart_as(judged, outliers | (fits.scheme is None))
 
 
 def bent_notice(found: "Calibration", apart: Fits) -> list[Notice]:

@@ -5,14 +5,14 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from truearm._core import ConstantFit
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.fits.known_scale import KnownScale
 from truearm.lengths import length_mm
 from truearm.types import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantDetails:
+class ConstantDetails(HoldsReadOnly):
     """About the constant model.
 
     `truearm.calibrate` makes one, `calibration.constant`.

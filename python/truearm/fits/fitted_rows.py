@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, residuals
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.errors import Notice, count_of
 from truearm.fits.core_set import Selection, core_set, distance_ends
 from truearm.fits.fitting import Fits, Task, constant_variances
 from truearm.fits.models import ArmModel
 from truearm.measurements import Measurements
 from truearm.rows.splitting import Split
-from truearm.types import Floats
+from truearm.types import Floats, Mask
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ ODDS_OF_CHANCE: Final = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class FittedRows:
+class FittedRows(HoldsReadOnly):
     """n rows in the order they were fitted in.
 
     `truearm.calibrate` makes one, `calibration.rows`.
@@ -57,6 +57,7 @@ class FittedRows:
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
             where no drift was taken out.
         orientation: Whether orientation was fitted, so that `residual` ends with it.
+        turned: `turn_rad` (n,) where it is not what `residual` says, rad; None where it is.
     """
 
     data: Measurements
@@ -68,9 +69,11 @@ class FittedRows:
     moved: Floats | None = None
     progress: Floats | None = None
     orientation: bool = False
+    turned: Floats | None = None
 
     def __post_init__(self) -> None:
-        hold_read_only(self, "side", "weight", "residual", "score", "distance_m", "moved", "progress")
+        hold_read_only(self, "side", "weight", "residual", "score", "distance_m")
+        hold_read_only(self, "moved", "progress", "turned")
 
     def __repr__(self) -> str:
         return f"<FittedRows: {count_of(len(self.side), 'row')}, {count_of(len(self.outliers()), 'outlier')}>"
@@ -78,30 +81,49 @@ class FittedRows:
     @classmethod
     def of(cls, task: Task, fits: Fits, side: NDArray[np.int64]) -> "FittedRows":
         """Internal: the rows of a fit; `side` (n,) in their order."""
-        selection = task.selection
         if fits.variable is None:
-            width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
-            residual = fits.constant.residuals.reshape(-1, width)
-            score = _judge_constant(fits, residual, selection)
-            if selection.distances:
-                distance = at_rows(np.abs(residual[:, 0]), fits.data)
-            else:
-                distance = farthest_m(residual, selection)
-            if fits.scheme is not None:
-                residual = _residuals(task, fits.models(task.arm)[fits.scheme_name], fits.data)
-                distance = np.where(score > 1.0, distance, farthest_m(residual, selection))
-            found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
-        else:
-            variable = fits.variable
-            distance = np.maximum(variable.distances, farthest_m(variable.residuals, selection))
-            found = cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
+            return cls._of_constants(task, fits, side)
+        selection, variable = task.selection, fits.variable
+        distance = np.maximum(variable.distances, farthest_m(variable.residuals, selection))
+        found = cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
         return replace(found, orientation=selection.orientation)
+
+    @classmethod
+    def _of_constants(cls, task: Task, fits: Fits, side: NDArray[np.int64]) -> "FittedRows":
+        """Those of constants, or of a scheme beside them."""
+        selection, data = task.selection, fits.data
+        width = 1 if selection.distances else fits.constant.residuals.size // len(data)
+        residual = fits.constant.residuals.reshape(-1, width)
+        if selection.distances:
+            distance = at_rows(np.abs(residual[:, 0]), data)
+        else:
+            distance = farthest_m(residual, selection)
+        score = scores_of_constants(fits, residual, selection)
+        found = cls(data, side, fits.constant.weights, residual, score, distance)
+        found = replace(found, orientation=selection.orientation)
+        if fits.scheme is None:
+            return found
+        residual = _residuals(task, fits.models(task.arm)[fits.scheme_name], data)
+        own = replace(found, residual=residual, distance_m=farthest_m(residual, selection))
+        return own.apart_as(found, score > 1.0)
+
+    def apart_as(self, others: "FittedRows", which: Mask) -> "FittedRows":
+        """Internal: the same rows, `which` (n,) of them as far off and as turned as `others` say."""
+        distance = np.where(which, others.distance_m, self.distance_m)
+        turned = np.where(which, others.turn_rad, self.turn_rad) if self.orientation else None
+        return replace(self, distance_m=distance, turned=turned)
 
     @property
     def turn_rad(self) -> Floats:
-        """How far each row (n,) is turned from how the model has it, as `residual` says: never leave-one-out,
-        which of outliers is the same. NaN where orientation was not fitted.
+        """How far each row (n,) is turned from how the model has it, rad; NaN where its orientation was not
+        fitted.
+
+        It is what `residual` says, never leave-one-out, which of outliers is the same. That of a scheme's
+        outliers is, as `distance_m`, from how its constants have them, and so is that of rows that bend
+        constants from how those have them that they do not bend.
         """
+        if self.turned is not None:
+            return self.turned
         if not self.orientation or self.data.orientations is None:
             return np.full(len(self.side), np.nan)
         return np.where(self.data.oriented, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)
@@ -204,8 +226,8 @@ def farthest_m(residual: Floats, selection: Selection) -> Floats:
     return np.asarray(np.linalg.norm(residual[:, : 3 * count].reshape(-1, count, 3), axis=2).max(axis=1))
 
 
-def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> Floats:
-    """Score (n,) of each row against the constant model."""
+def scores_of_constants(fits: Fits, residual: Floats, selection: Selection) -> Floats:
+    """Score (n,) of each row by what the constants leave of it (n, m), of distances (d, 1)."""
     variances = constant_variances(fits, selection)
     if selection.distances:
         variances = variances[distance_ends(fits.data)[:, 0]]

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.errors import InputError
 from truearm.fits.core_set import Selection
 from truearm.measurements import Measurements
@@ -22,7 +22,7 @@ SAME_WORTH: Final = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredParts:
+class MeasuredParts(HoldsReadOnly):
     """How many rows of each of G set-ups hold what was fitted.
 
     Attributes:

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.errors import count_of, list_names
 from truearm.judgement.validation import RowErrors
 from truearm.measurements import Measurements
@@ -24,7 +24,7 @@ FEWEST_POSES: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
-class HeldRows:
+class HeldRows(HoldsReadOnly):
     """n rows and what each model missed there. The error of a pair's distance is at the first of its rows.
 
     `truearm.calibrate` makes one, `calibration.held`; `truearm.evaluate` another, `evaluation.rows`.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
-from truearm.arrays import hold_read_only
+from truearm.arrays import HoldsReadOnly, hold_read_only
 from truearm.errors import InputError, count_of
 from truearm.fits.core_set import Selection, core_set, first_measured
 from truearm.fits.details import DriftDetails
@@ -91,7 +91,7 @@ class Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class RowErrors:
+class RowErrors(HoldsReadOnly):
     """Errors of one model, row by row, measured minus predicted in the base frame; NaN where not measured.
 
     `truearm.evaluate` makes one, as values of `evaluation.rows.errors`.

@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.arrays import as_numbers, as_rows
+from truearm.arrays import HoldsReadOnly, as_numbers, as_rows, read_only
 from truearm.description.joint_axes import axes_at_zero
 from truearm.errors import InputError, UsageError, count_of
 from truearm.fits.endpoints import at_tool
@@ -144,8 +144,8 @@ class JointLimits:
         return np.asarray(inside.all(axis=1))
 
 
-@dataclass(frozen=True)
-class InBox:
+@dataclass(frozen=True, eq=False)
+class InBox(HoldsReadOnly):
     """The tool point lies in a box in the base frame, from `low` to `high` (3,), m."""
 
     low: ArrayLike
@@ -161,8 +161,8 @@ class InBox:
         )
 
 
-@dataclass(frozen=True)
-class InSphere:
+@dataclass(frozen=True, eq=False)
+class InSphere(HoldsReadOnly):
     """The tool point is between `least_m` and `radius_m` away from `centre` (3,) in the base frame."""
 
     centre: ArrayLike
@@ -180,8 +180,8 @@ class InSphere:
         return np.asarray((distance <= self.radius_m) & (distance >= self.least_m))
 
 
-@dataclass(frozen=True)
-class InCone:
+@dataclass(frozen=True, eq=False)
+class InCone(HoldsReadOnly):
     """A device at `apex` sees the tool point, within `half_angle_rad` of the `axis` that it looks along.
 
     Attributes:
@@ -208,8 +208,8 @@ class InCone:
         return np.asarray((seen <= self.half_angle_rad) & (facing <= self.target_half_angle_rad))
 
 
-@dataclass(frozen=True)
-class LeastContactAngle:
+@dataclass(frozen=True, eq=False)
+class LeastContactAngle(HoldsReadOnly):
     """The pin meets the touch panel at no less than an angle, 15 deg in section 7 of the paper.
 
     Attributes:
@@ -234,8 +234,8 @@ class LeastContactAngle:
         return np.asarray(from_plane >= np.deg2rad(self.least_deg))
 
 
-@dataclass(frozen=True)
-class KeepOut:
+@dataclass(frozen=True, eq=False)
+class KeepOut(HoldsReadOnly):
     """No part of the arm is in a box in the base frame, from `low` to `high` (3,), m.
 
     The arm is taken as straight lines between the frames of its links, from the base's to the tool: the box,
@@ -350,8 +350,8 @@ def _hold_direction(rule: Rule, name: str) -> None:
 
 
 def _hold(rule: Rule, name: str, numbers: Floats) -> None:
-    """Give a rule numbers that do not change with the array that was given."""
-    object.__setattr__(rule, name, tuple(numbers.tolist()))
+    """Give a rule a read-only array that does not change with the one that was given."""
+    object.__setattr__(rule, name, read_only(numbers))
 
 
 def _angle(vectors: Floats, others: Floats) -> Floats:

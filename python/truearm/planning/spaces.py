@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truearm.arrays import as_numbers, read_only
+from truearm.arrays import HoldsReadOnly, as_numbers, read_only
 from truearm.errors import UsageError
 from truearm.fits.scheme_options import MAJOR_JOINTS
 from truearm.kinds import required, whole_numbers
@@ -52,7 +52,7 @@ class Space(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class JointSpace:
+class JointSpace(HoldsReadOnly):
     """Readings of some joints; the others are held.
 
     Attributes:
@@ -118,7 +118,7 @@ class JointSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class CartesianSpace:
+class CartesianSpace(HoldsReadOnly):
     """Positions of the tool point, reached by three joints in one configuration; the others are held.
 
     Attributes:

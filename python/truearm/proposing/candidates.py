@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truearm._core import Problem, Setup, linearise, setup_jacobian
-from truearm.arrays import as_rows, read_only
+from truearm.arrays import HoldsReadOnly, as_rows, read_only
 from truearm.calibration import Calibration
 from truearm.certainty.uncertainty import task_of
 from truearm.errors import UsageError, WorkError, count_of, did_you_mean, list_names
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(HoldsReadOnly):
     """c poses that can be measured, in a set-up of the calibration with what was measured there.
 
     Attributes:

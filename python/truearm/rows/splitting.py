@@ -326,7 +326,7 @@ def split_columns(data: Measurements) -> dict[str, NDArray[np.float64]]:
     """What rows can be split by, a number for each row (n,): features, group and joints."""
     known = {f"q{j + 1}": data.readings[:, j] for j in range(data.joint_count)}
     known["group"] = np.unique(data.group, return_inverse=True)[1].astype(np.float64)
-    return known | {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}
+    return known | {str(name): values.to_numpy(np.float64) for name, values in data.features.items()}
 
 
 def _kin_of(data: Measurements) -> _Kin:

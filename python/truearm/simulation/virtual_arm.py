@@ -103,6 +103,9 @@ class VirtualArm:
         self._harmonics = rng.normal(scale=DRAWN_HARMONIC, size=(2 * len(self._waving), outputs))
         self._harmonics *= self._scale_to_share()
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__ |= state | {"_errors": read_only(state["_errors"])}
+
     @property
     def errors(self) -> Floats:
         """True minus nominal parameters (rows, 5) in m and rad, theta, d, a, alpha, beta in a row; the rows

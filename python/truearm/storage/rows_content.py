@@ -24,7 +24,8 @@ NUMBERS: Final = (
 CALLED: Final = "default_group"
 WORDS: Final = ("group", "sources", "anchor", "pair", "purpose", CALLED)
 OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")
-OF_DRIFT: Final = ("moved", "progress")
+OF_SOME: Final = ("moved", "progress", "turned")
+"""Outcomes of rows that drift was taken out of, and of those whose turns are not what their residuals say."""
 
 
 def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str, Any]:
@@ -45,7 +46,7 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
         arrays[f"rows.feature.{name}"] = rows.data.features[name].to_numpy(np.float64)
     for name in OUTCOMES:
         arrays[f"outcome.{name}"] = getattr(rows, name)
-    for name in OF_DRIFT:
+    for name in OF_SOME:
         if getattr(rows, name) is not None:
             arrays[f"outcome.{name}"] = getattr(rows, name)
     return {"words": words, "features": kept, "joint_units": list(rows.data.joint_units)}
@@ -73,7 +74,7 @@ def unpack(content: Mapping[str, Any], arrays: Arrays, *, selection: Selection) 
         features=pd.DataFrame(columns, index=index),
         joint_units=tuple(content["joint_units"]),
     )
-    known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
+    known = [*OUTCOMES, *(name for name in OF_SOME if f"outcome.{name}" in arrays)]
     outcomes: dict[str, Any] = {name: np.array(arrays[f"outcome.{name}"]) for name in known}
     found = FittedRows(data, **outcomes, orientation=selection.orientation)
     return _of_distances(found) if selection.distances else found

@@ -14,7 +14,9 @@ class _Copies:
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, record: object, kind: type | None = None) -> pd.DataFrame:
+    def __get__(self, record: object, kind: type | None = None) -> "pd.DataFrame | _Copies":
+        if record is None:  # asked of the class, as tools that document it do
+            return self
         table: pd.DataFrame = record.__dict__[self._name]
         return table.copy()
 
