@@ -15,21 +15,18 @@ from truearm.proposing import Candidates
 from truearm.rows.splitting import split_columns
 from truearm.simulation import VirtualArm
 
-
-@pytest.fixture(scope="module")
-def robot():
-    return ta.Robot.load("ur10")
+ROBOT = ta.Robot.load("ur10")
 
 
 @pytest.fixture(scope="module")
-def data(robot):
-    arm = VirtualArm(robot, seed=2)
-    return arm.measure(arm.poses(60))
+def data():
+    virtual = VirtualArm(ROBOT, seed=2)
+    return virtual.measure(virtual.poses(60))
 
 
 @pytest.fixture(scope="module")
-def calibration(robot, data):
-    return ta.calibrate(robot, data, model="constant")
+def calibration(data):
+    return ta.calibrate(ROBOT, data, model="constant")
 
 
 @pytest.mark.parametrize(
@@ -59,11 +56,11 @@ def test_joint_values_are_no_ones_readings(name):
     np.testing.assert_array_equal(q, 0.2)
 
 
-def test_candidates_spaces_and_rules_keep_their_numbers(robot, calibration):
+def test_candidates_spaces_and_rules_keep_their_numbers(calibration):
     q = np.full((2, 6), 0.2)
     candidates = Candidates(calibration, q)
     held, low, high = q[0], np.zeros(3), np.ones(3)
-    space, box, kept = JointSpace(robot, low, high, held=held), InBox(low, high), KeepOut(low, high)
+    space, box, kept = JointSpace(ROBOT, low, high, held=held), InBox(low, high), KeepOut(low, high)
     for array in (q, low, high):
         array[:] = 5.0
     np.testing.assert_array_equal(candidates.readings, 0.2)
@@ -167,8 +164,8 @@ def test_what_a_calibration_says_by_name_cannot_be_set(calibration, data):
             found.holdout.clear()
 
 
-def test_the_errors_of_a_virtual_arm_are_as_drawn(robot):
-    arm = VirtualArm(robot, seed=1)
+def test_the_errors_of_a_virtual_arm_are_as_drawn():
+    arm = VirtualArm(ROBOT, seed=1)
     with pytest.raises(ValueError, match="read-only"):
         arm.errors[2, 2] += 0.01
     with pytest.raises(AttributeError, match="errors"):
@@ -180,7 +177,7 @@ def sent(value):
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, sent])
-def test_what_cannot_be_changed_cannot_be_after_a_copy_either(again, robot, data, calibration):
+def test_what_cannot_be_changed_cannot_be_after_a_copy_either(again, data, calibration):
     evaluated = ta.evaluate(calibration, data)
     held: list[tuple[Any, str]] = [
         (calibration.rows, "residual"),
@@ -189,9 +186,9 @@ def test_what_cannot_be_changed_cannot_be_after_a_copy_either(again, robot, data
         (calibration.constant, "covariance"),
         (calibration.measured, "targets"),
         (Candidates(calibration, data.readings), "readings"),
-        (VirtualArm(robot, seed=1), "errors"),
-        (JointSpace(robot, np.zeros(3), np.ones(3)), "low"),
-        (CartesianSpace(robot, np.zeros(3), np.ones(3)), "origin"),
+        (VirtualArm(ROBOT, seed=1), "errors"),
+        (JointSpace(ROBOT, np.zeros(3), np.ones(3)), "low"),
+        (CartesianSpace(ROBOT, np.zeros(3), np.ones(3)), "origin"),
         (InBox(np.zeros(3), np.ones(3)), "high"),
     ]
     for thing, name in held:

@@ -196,7 +196,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     trained = facts.calibration.validation.poses_trained
     unsure = (
         ", though so few poses hardly tell noise from what the model misses"
-        if (facts.train_mean_mm / floor) ** 2 < LEFT_IN_TRAINING
+        if facts.train_mean_mm**2 < LEFT_IN_TRAINING * floor**2
         else ""
     )
     words = (

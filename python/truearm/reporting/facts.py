@@ -262,7 +262,7 @@ class Facts:
 
     @property
     def leaves_more_than_noise(self) -> bool:
-        """Whether the model took more than noise for noise: what moved meanwhile, or with a column."""
+        """Whether more than noise is told as noise: what moved, slipped, or is stated as sigma."""
         return any(map(self.noticed, TAKEN_FOR_NOISE))
 
     @cached_property
